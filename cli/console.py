@@ -1,0 +1,80 @@
+"""Talking to a person: results on standard output, progress and errors on standard error."""
+
+import sys
+import time
+from types import TracebackType
+from typing import TextIO
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+#: Time between two lines of progress where there is no terminal [s].
+QUIET = 5.0
+
+
+def say(text: str) -> None:
+    """A result, or a line about what was done."""
+    typer.echo(text)
+
+
+def next_step(*commands: str) -> None:
+    """Name the commands to run next."""
+    typer.echo("next: " + "   or: ".join(commands))
+
+
+class ProgressView:
+    """The progress of a study: a bar on a terminal, a line every few seconds elsewhere.
+
+    An instance is the callback itself, ``(text, done, total)``; total 0 means unknown.
+
+    Args:
+        stream: where to show it; default standard error.
+    """
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream or sys.stderr
+        self._bar: Progress | None = None
+        self._task: TaskID | None = None
+        self._last = ("", -QUIET)
+
+    def __enter__(self) -> "ProgressView":
+        if self._stream.isatty():
+            self._bar = Progress(
+                TextColumn("{task.description}", markup=False),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                console=Console(file=self._stream),
+                transient=True,
+            )
+            self._bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def __call__(self, text: str, done: int, total: int) -> None:
+        if self._bar is None:
+            self._line(text, done, total)
+            return
+        if self._task is None:
+            self._task = self._bar.add_task(text, total=total or None)
+        if text != self._last[0]:
+            self._bar.reset(self._task, total=total or None, description=text)
+            self._last = (text, 0.0)
+        self._bar.update(self._task, completed=done, total=total or None)
+
+    def _line(self, text: str, done: int, total: int) -> None:
+        now, (before, when) = time.monotonic(), self._last
+        ended = total > 0 and done >= total
+        if now - when < QUIET and not (ended and text == before) and text == before:
+            return
+        if text != before and now - when < QUIET and when > 0 and done > 0 and not ended:
+            return
+        self._last = (text, now)
+        print(f"{text}: {done} of {total}" if total else text, file=self._stream, flush=True)

@@ -1,0 +1,96 @@
+"""The verdict: one sentence that a reader takes away, and one that qualifies it."""
+
+from dataclasses import dataclass
+
+from ...core.errors import MuslinError
+from ...core.scenarios import preset
+from .gather import Findings
+from .words import errors, length, number, sentence, words
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is said on top.
+
+    Args:
+        label: a word or two, for the tag above the sentence.
+        tone: ``"good"``, ``"bad"`` or ``"open"``.
+        headline: one big sentence.
+        detail: what qualifies it.
+        next_step: command that would tell more, or "".
+    """
+
+    label: str
+    tone: str
+    headline: str
+    detail: str = ""
+    next_step: str = ""
+
+
+def thing(found: Findings) -> str:
+    """What is being looked at, in one word."""
+    try:
+        kind = preset(found.study.config.scenario.name).kind
+    except MuslinError:
+        return "object"
+    return kind if kind in ("cloth", "rope") else "object"
+
+
+def verdict(found: Findings) -> Verdict:
+    """What the study says as far as it has come."""
+    file = found.study.path.name
+    if found.diagnose is not None:
+        return _diagnosed(found)
+    if found.compare is None:
+        count = len(found.fit.names)
+        return Verdict(
+            "fitted",
+            "open",
+            f"{count} parameter{'s' * (count != 1)} fitted; whether the model is right has not been checked yet.",
+            next_step=f"muslin compare {file}",
+        )
+    e = errors(found)
+    numbers = f"{length(e['before'], e['unit'])} on the {e['on']} recordings, noise {length(e['noise'], e['unit'])}"
+    detail = str(found.compare.get("text", ""))
+    if found.compare.get("adequate"):
+        return Verdict("adequate", "good", f"The fitted model explains the recordings: error {numbers}.", detail)
+    return Verdict(
+        "misfit",
+        "bad",
+        f"The fitted model does not explain the recordings: error {numbers}.",
+        detail,
+        f"muslin diagnose {file}",
+    )
+
+
+def _diagnosed(found: Findings) -> Verdict:
+    assert found.diagnose is not None
+    result, e, file = found.diagnose, errors(found), found.study.path.name
+    before, after, noise = (length(e[k], e["unit"]) for k in ("before", "after", "noise"))
+    effects = [str(n) for n in result.get("effects") or []]
+    named = " and ".join(words(n) for n in effects)
+    best = next((c for n in effects for c in found.candidates if c["name"] == n), None)
+    detail = sentence(best, e["unit"], e["noise"], thing(found)) if best else " ".join(found.paragraphs[:1])
+    floor = f"noise {noise}"
+    if result["verdict"] == "named":
+        drop = f"the {e['on']} error falls from {before} to {after} ({floor})"
+        if number(e["after"]) is None:
+            drop = f"the {e['on']} error is {before} ({floor})"
+        add = "" if found.after_inferred else f"muslin add {effects[0]} {file}" if effects else ""
+        verb = "are" if len(effects) > 1 else "is"
+        return Verdict("named", "good", _cap(f"{named} {verb} missing from the model; with it, {drop}."), detail, add)
+    if result["verdict"] == "tied":
+        rivals = " or ".join(words(n) for n in effects)
+        text = f"Something is missing, {rivals}; these recordings cannot tell which. The error is {before}, {floor}."
+        return Verdict("tied", "open", text, " ".join(found.paragraphs) or detail)
+    text = {
+        "none": f"The model misses the measurement by {before} where noise is {noise}, and no candidate explains it.",
+        "cannot-tell": f"The error is {before} at {floor}; these recordings cannot show what is missing.",
+        "no-misfit": f"Nothing is missing: the {e['on']} error is {before}, {floor}.",
+    }.get(str(result["verdict"]), f"Verdict: {result['verdict']}.")
+    tone = {"none": "bad", "no-misfit": "good"}.get(str(result["verdict"]), "open")
+    return Verdict(words(str(result["verdict"])), tone, text, " ".join(found.paragraphs))
+
+
+def _cap(text: str) -> str:
+    return text[:1].upper() + text[1:]

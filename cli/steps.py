@@ -1,0 +1,153 @@
+"""``muslin fit``, ``compare``, ``diagnose``, ``add`` and ``report``: the steps of a study."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..core.errors import InputError, MissingFileError
+from ..core.store import storage_errors
+from ..core.study import Study
+from .console import ProgressView, next_step, say
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(min=1, metavar="N", help="Worker processes; default one a core. The result does not depend on it."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there already.")]
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands of this file."""
+    app.command("fit")(fit)
+    app.command("compare")(compare)
+    app.command("diagnose")(diagnose)
+    app.command("add")(add)
+    app.command("report")(report)
+
+
+def fit(study: StudyFile, workers: Workers = None) -> None:
+    """Fit the simulator to the recordings that the study fits on.
+
+    Simulates draws from the prior, trains the estimator on them, and draws again where the posterior lies.
+    Interrupted, it goes on from the draws it had when it is run again; a finished fit is shown at once.
+    """
+    with ProgressView() as progress:
+        result = Study.load(study, workers=workers, progress=progress).fit()
+    say(result.text())
+    next_step(f"muslin compare {study}")
+
+
+def compare(study: StudyFile, workers: Workers = None) -> None:
+    """Hold the fitted simulator against every recording: how large the error is, where, and when."""
+    with ProgressView() as progress:
+        result = Study.load(study, workers=workers, progress=progress).compare()
+    say(result.text())
+    next_step(f"muslin diagnose {study}")
+
+
+def diagnose(
+    study: StudyFile,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write the verdict to this JSON file, too.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Say which physical effect the simulator lacks.
+
+    The verdict is one of: named (this effect), tied (these cannot be told apart), none (a misfit that no
+    candidate explains), cannot-tell (the data could not show it), no-misfit.
+    """
+    if json_file is not None:  # hours of simulation must not end at a misspelt folder
+        _check_output(json_file, force=True)
+    with ProgressView() as progress:
+        result = Study.load(study, workers=workers, progress=progress).diagnose()
+    say(result.text())
+    verdict = result.to_json()
+    if json_file is not None:
+        _write(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
+        say(f"wrote {json_file}")
+    effects = verdict.get("effects") or []
+    if verdict.get("verdict") == "named" and effects:
+        output = study.with_name(f"{study.stem}-with-{effects[0]}.toml")
+        next_step(f"muslin add {effects[0]} {study} -o {output}", f"muslin report {study}")
+    else:
+        next_step(f"muslin report {study}")
+
+
+def add(
+    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them.")],
+    study: StudyFile,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="STUDY2.toml", help="The new study file; default STUDY-with-EFFECT.toml."),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write a study of the same model with one more effect, its coefficients inferred from the recordings."""
+    loaded = Study.load(study)
+    target = output or study.with_name(f"{study.stem}-with-{effect}.toml")
+    if target.resolve() == study.resolve():
+        raise InputError(f"{target} is the study itself; name another file with -o")
+    _check_output(target, force)
+    made = loaded.add(effect, target)
+    say(f"wrote {made.path}: the model of {study} with {effect}")
+    next_step(f"muslin fit {made.path}")
+
+
+def report(
+    study: StudyFile,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="REPORT.html", help="The HTML file; default beside the study.")
+    ] = None,
+) -> None:
+    """Write one self-contained HTML file: fit, errors over time, ranking of effects, before and after."""
+    from .report import write_report
+
+    if output is not None:
+        _check_output(output, force=True)
+    made = write_report(Study.load(study))
+    if output is not None and output.resolve() != made.resolve():
+        partial = output.with_name(f".{output.name}.partial")
+        with storage_errors(output):
+            try:
+                shutil.copyfile(made, partial)
+                partial.replace(output)
+            finally:
+                partial.unlink(missing_ok=True)
+        made = output
+    say(f"wrote {made}")
+    say("open it in a browser; it needs no other file")
+
+
+def _check_output(path: Path, force: bool) -> None:
+    if not path.absolute().parent.is_dir():
+        raise MissingFileError(f"there is no folder {path.absolute().parent} for {path.name}; make it first")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a file in it")
+    if path.exists() and not force:
+        raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
+
+
+def _write(path: Path, text: str) -> None:
+    """All of it or nothing."""
+    partial = path.with_name(f".{path.name}.partial")
+    with storage_errors(path):
+        try:
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no NaN and no infinity: they become null."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,1 @@
+"""Interfaces, domain types, the store, the registry and the study. Needs no engine and no torch."""

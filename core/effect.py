@@ -1,0 +1,75 @@
+"""Effects: physics that a model may lack. Written once, run on every backend."""
+
+from abc import ABC
+from collections.abc import Callable
+from typing import ClassVar, TypeAlias
+
+from .arrays import FloatArray
+from .errors import InputError
+from .material import Material
+from .motion import Motion
+from .parameters import Parameter
+from .scene import Scene
+
+#: ``(time [s], positions (V, 3) [m], velocities (V, 3) [m/s]) -> nodal forces (V, 3) [N]``
+NodalForce: TypeAlias = Callable[[float, FloatArray, FloatArray], FloatArray]
+
+
+class Effect(ABC):
+    """A physical effect with named coefficients; all coefficients zero is exactly off.
+
+    A model with the effect therefore nests the model without it. Subclasses declare
+    :attr:`coefficients` and override the hooks that they act through; the default of every hook is the
+    identity. A hook is never called on an effect that is off.
+
+    Args:
+        values: coefficients by name [their units]; missing ones are zero.
+    """
+
+    name: ClassVar[str]
+    #: Coefficients with their unit and prior range. The range must contain zero or touch it.
+    coefficients: ClassVar[tuple[Parameter, ...]]
+    #: What it acts on, for people: "force", "material", "gravity", "command" or "observation".
+    acts_on: ClassVar[str]
+    #: Kinds of body for which it is meaningful.
+    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
+    #: One clause that completes "the object ...": what one sees when the effect is missing from a model.
+    symptom: ClassVar[str] = "moves differently"
+
+    def __init__(self, **values: float) -> None:
+        known = [c.name for c in self.coefficients]
+        for given in values:
+            if given not in known:
+                raise InputError(f"effect {self.name!r} has no coefficient {given!r}; it has {', '.join(known)}")
+        self.values: dict[str, float] = {c: float(values.get(c, 0.0)) for c in known}
+
+    @property
+    def is_off(self) -> bool:
+        return all(v == 0.0 for v in self.values.values())
+
+    @classmethod
+    def parameters(cls) -> tuple[Parameter, ...]:
+        """The coefficients as parameters of a study, named ``effect.coefficient``."""
+        return tuple(
+            Parameter(f"{cls.name}.{c.name}", c.unit, c.low, c.high, c.scale, c.description) for c in cls.coefficients
+        )
+
+    def on_material(self, material: Material) -> Material:
+        return material
+
+    def on_gravity(self, gravity: FloatArray) -> FloatArray:
+        """Gravity ``(3,)`` [m/s2] as this effect turns it."""
+        return gravity
+
+    def on_command(self, motion: Motion, time_step: float) -> Motion:
+        """The motion that the grippers really make when told ``motion``; may resample at ``time_step`` [s]."""
+        return motion
+
+    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:
+        """The nodal force of this effect in ``scene``, or None if it acts in another way.
+
+        Args:
+            scene: material and gravity as all effects have left them.
+            masses: lumped vertex masses ``(V,)`` [kg], loads included.
+        """
+        return None

@@ -1,0 +1,105 @@
+"""From a file to recordings: choose the reader, then put units, axes and names right."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, MissingFileError
+from ..measurement import Recording
+from ..motion import Motion
+from ..series import PointSeries
+from .axes import turned
+from .c3d import read_c3d
+from .csv_points import read_csv
+from .gripper import read_gripper_csv, to_motion
+from .npz import read_npz
+from .options import ImportOptions
+from .raw import RawTake
+from .units import to_si, unit_named
+
+#: Suffix -> reader.
+FORMATS: dict[str, Callable[[Path], list[RawTake]]] = {".npz": read_npz, ".c3d": read_c3d, ".csv": read_csv}
+
+
+def import_file(path: Path, options: ImportOptions | None = None) -> list[Recording]:
+    """Recordings of one file; only a CSV can hold several.
+
+    Args:
+        path: of the file; its suffix says the format.
+        options: what a person says about it.
+
+    Raises:
+        MissingFileError: the file, or the one of the gripper poses, does not exist.
+        InputError: the file cannot be right; says where and what would be.
+    """
+    options = options or ImportOptions()
+    _check_file(path)
+    reader = FORMATS.get(path.suffix.lower())
+    if reader is None:
+        known = ", ".join(FORMATS)
+        raise InputError(f"{path}: files ending in {path.suffix!r} cannot be imported; formats are {known}")
+    if options.gripper is not None:
+        _check_file(options.gripper)
+    takes = reader(path)
+    if len(takes) > 1 and options.name is not None:
+        raise InputError(f"{path} holds {len(takes)} recordings with names of their own; leave --name out")
+    return [_recording(take, path, options) for take in takes]
+
+
+def _check_file(path: Path) -> None:
+    if not path.exists():
+        raise MissingFileError(f"there is no file {path}")
+    if not path.is_file():
+        raise InputError(f"{path} is a folder; name a file")
+
+
+def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
+    name = options.name or take.name or path.stem
+    where = f"{path}, recording {name!r}" if take.name else str(path)
+    unit = unit_named(options.unit or take.unit or "m", str(path) if not options.unit else "--unit")
+    gripper = _gripper(take, path, options, name, unit)
+    take = _cropped(take, options, where)
+    points, si = to_si(take.points, unit, where)
+    points = turned(points, options.up, where)
+    told = [c for c in (options.correspondence, take.correspondence) if c is not None]
+    try:
+        series = PointSeries(take.time, points, si, told[0] if told else True)
+        load = options.load if options.load is not None else (take.load or 0.0)
+        return Recording(name, series, gripper, options.motion or take.motion or "", load)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def _gripper(take: RawTake, path: Path, options: ImportOptions, name: str, unit: str) -> Motion | None:
+    if options.gripper is not None:
+        return to_motion(read_gripper_csv(options.gripper, name), unit, options.up, str(options.gripper))
+    if take.gripper is not None:
+        return to_motion(take.gripper, unit, options.up, str(path))
+    return None
+
+
+def _cropped(take: RawTake, options: ImportOptions, where: str) -> RawTake:
+    """Only the frames from start to stop; the clock is not shifted, gripper poses share it."""
+    low = -np.inf if options.start is None else options.start
+    high = np.inf if options.stop is None else options.stop
+    if low == -np.inf and high == np.inf:
+        return take
+    if not low < high:
+        raise InputError(f"{where}: start must be before stop, but start = {low:g} s and stop = {high:g} s")
+    keep = (take.time >= low) & (take.time <= high)
+    if keep.sum() < 2:
+        raise InputError(
+            f"{where}: fewer than 2 frames lie between {low:g} and {high:g} s; "
+            f"the file goes from {np.nanmin(take.time):g} to {np.nanmax(take.time):g} s"
+        )
+    return RawTake(
+        take.time[keep],
+        take.points[keep],
+        take.unit,
+        take.correspondence,
+        take.name,
+        take.motion,
+        take.load,
+        take.gripper,
+    )

@@ -1,0 +1,82 @@
+"""Measurements: one object, several recordings of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .motion import Motion
+from .series import PointSeries
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One take: what was seen, and what the grippers did meanwhile.
+
+    Args:
+        name: unique within the measurement.
+        series: the measured points.
+        gripper: gripper poses, or None when nothing moved (a clamped object).
+        motion: recordings with the same motion are repeats of each other; default the name.
+        load: extra mass hung where the scenario says [kg].
+    """
+
+    name: str
+    series: PointSeries
+    gripper: Motion | None = None
+    motion: str = ""
+    load: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.name or "/" in self.name:
+            raise InputError(f"a recording needs a name without '/', got {self.name!r}")
+        if self.load < 0:
+            raise InputError(f"recording {self.name!r}: load must not be negative, but is {self.load:g} kg")
+        if not self.motion:
+            object.__setattr__(self, "motion", self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Recordings of one object, by name.
+
+    Args:
+        recordings: in order.
+    """
+
+    recordings: tuple[Recording, ...]
+
+    def __post_init__(self) -> None:
+        if not self.recordings:
+            raise InputError("a measurement needs at least one recording")
+        names = self.names
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise InputError(f"recording named twice: {', '.join(twice)}; give each take its own name")
+        units = {r.series.unit for r in self.recordings}
+        if len(units) > 1:
+            raise InputError(f"recordings of one measurement must share a unit, but these have {sorted(units)}")
+
+    @property
+    def names(self) -> list[str]:
+        return [r.name for r in self.recordings]
+
+    @property
+    def unit(self) -> str:
+        return self.recordings[0].series.unit
+
+    def __getitem__(self, name: str) -> Recording:
+        for r in self.recordings:
+            if r.name == name:
+                return r
+        raise InputError(f"no recording {name!r} in this measurement; it has {', '.join(self.names)}")
+
+    def point_count(self) -> int:
+        return max(int(r.series.points.shape[1]) for r in self.recordings)
+
+    def repeats(self) -> dict[str, list[Recording]]:
+        """Recordings grouped by motion and load."""
+        groups: dict[str, list[Recording]] = {}
+        for r in self.recordings:
+            groups.setdefault(f"{r.motion}|{np.round(r.load, 6)}", []).append(r)
+        return groups

@@ -1,0 +1,75 @@
+"""Measurements on disk: one group a recording."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, cast
+
+import zarr
+
+from .errors import InputError
+from .measurement import Measurement, Recording
+from .motion import Motion
+from .series import PointSeries, PointUnit
+from .store import new_store, open_store, put, read, subgroup
+
+_AXES = ("x", "y", "z")
+
+
+def save_measurement(
+    measurement: Measurement, path: Path, *, hidden: Mapping[str, Any] | None = None, overwrite: bool = False
+) -> None:
+    """Write a store.
+
+    Args:
+        measurement: to write.
+        path: of the new store.
+        hidden: what a generated measurement hides, for the reader of a report; see :func:`read_hidden`.
+        overwrite: replace a store that is there.
+    """
+    with new_store(path, overwrite=overwrite) as root:
+        root.attrs.update({"kind": "measurement", "recordings": measurement.names})
+        if hidden is not None:
+            root.attrs["hidden"] = dict(hidden)
+        for r in measurement.recordings:
+            group = root.create_group(r.name)
+            group.attrs.update({"motion": r.motion, "load_kg": r.load, "correspondence": r.series.correspondence})
+            put(group, "time", r.series.time, ["time"], "s")
+            put(group, "axis", list(range(r.series.points.shape[2])), ["axis"], "1", "x, y, z")
+            put(group, "points", r.series.points, ["time", "point", "axis"], r.series.unit, "measured points")
+            if r.gripper is not None:
+                put(group, "gripper_time", r.gripper.times, ["gripper_time"], "s")
+                put(
+                    group,
+                    "gripper_pose",
+                    r.gripper.poses,
+                    ["gripper_time", "gripper", "pose"],
+                    "m",
+                    "position x y z [m], quaternion w x y z",
+                )
+
+
+def load_measurement(path: Path) -> Measurement:
+    """Read a store; the hidden label of a generated measurement is not read."""
+    root = open_store(path)
+    if root.attrs.get("kind") != "measurement":
+        raise InputError(f"{path} is not a measurement but {root.attrs.get('kind')!r}; make one with: muslin import")
+    names = cast(list[str], root.attrs["recordings"])
+    return Measurement(tuple(_recording(subgroup(root, name), name, path) for name in names))
+
+
+def read_hidden(path: Path) -> dict[str, Any] | None:
+    """What a generated measurement hides, or None. Only the report asks, after everything else is done."""
+    hidden = open_store(path).attrs.get("hidden")
+    return dict(cast(Mapping[str, Any], hidden)) if hidden is not None else None
+
+
+def _recording(group: zarr.Group, name: str, path: Path) -> Recording:
+    try:
+        unit = cast(PointUnit, str(group["points"].attrs["units"]))
+        series = PointSeries(read(group, "time"), read(group, "points"), unit, bool(group.attrs["correspondence"]))
+        gripper = None
+        if "gripper_pose" in group:
+            gripper = Motion(read(group, "gripper_time"), read(group, "gripper_pose"))
+        return Recording(name, series, gripper, str(group.attrs["motion"]), float(cast(float, group.attrs["load_kg"])))
+    except (InputError, KeyError) as error:
+        raise InputError(f"{path}, recording {name!r}: {error}") from error

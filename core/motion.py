@@ -1,0 +1,73 @@
+"""Gripper motion over time: what a robot was told to do, or was measured doing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import FloatArray
+from .errors import InputError
+
+IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def rotate(quaternion: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Rotate ``vectors (..., 3)`` by unit quaternions w x y z ``(..., 4)``, broadcasting."""
+    w, u = quaternion[..., :1], quaternion[..., 1:]
+    t = 2.0 * np.cross(u, vectors)
+    return np.asarray(vectors + w * t + np.cross(u, t))
+
+
+def inverse(quaternion: FloatArray) -> FloatArray:
+    """The inverse of unit quaternions w x y z ``(..., 4)``."""
+    return np.asarray(quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Poses of G grippers at K times, held before the first and after the last.
+
+    Args:
+        times: ``(K,)`` [s], rising.
+        poses: ``(K, G, 7)``: position x y z [m] and quaternion w x y z.
+    """
+
+    times: FloatArray
+    poses: FloatArray
+
+    def __post_init__(self) -> None:
+        if self.times.ndim != 1 or self.poses.shape[:1] != self.times.shape or self.poses.shape[2:] != (7,):
+            raise InputError(
+                f"a motion needs times (K,) and poses (K, G, 7), got {self.times.shape} and {self.poses.shape}"
+            )
+        if len(self.times) > 1 and not (np.diff(self.times) > 0).all():
+            k = int(np.argmin(np.diff(self.times) > 0)) + 1
+            raise InputError(
+                f"time must rise, but time[{k}] = {self.times[k]:g} s follows time[{k - 1}] = {self.times[k - 1]:g} s"
+            )
+
+    @classmethod
+    def from_positions(cls, times: FloatArray, positions: FloatArray) -> "Motion":
+        """Grippers that never turn: ``positions (K, G, 3)`` [m]."""
+        turn = np.broadcast_to(IDENTITY_POSE[3:], (*positions.shape[:2], 4))
+        return cls(np.asarray(times, float), np.concatenate([positions, turn], axis=2))
+
+    @classmethod
+    def still(cls, grippers: int = 1) -> "Motion":
+        return cls(np.zeros(1), np.tile(IDENTITY_POSE, (1, grippers, 1)))
+
+    @property
+    def grippers(self) -> int:
+        return int(self.poses.shape[1])
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Poses ``(T, G, 7)`` at ``times (T,)`` [s]; positions linear, quaternions along the chord."""
+        if len(self.times) == 1:
+            return np.repeat(self.poses, len(times), axis=0)
+        right = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self.times) - 1)
+        span = self.times[right] - self.times[right - 1]
+        share = np.clip((times - self.times[right - 1]) / span, 0.0, 1.0)[:, None, None]
+        a, b = self.poses[right - 1], self.poses[right].copy()
+        b[..., 3:] *= np.where(np.sum(a[..., 3:] * b[..., 3:], axis=-1, keepdims=True) < 0, -1.0, 1.0)
+        out = a + share * (b - a)
+        out[..., 3:] /= np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
+        return np.asarray(out)

@@ -1,0 +1,133 @@
+"""Scenarios: an object, how it is held, what is around it and where its markers sit."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .body import Body
+from .errors import InputError
+from .material import Material
+from .measurement import Recording
+from .motion import Motion, inverse, rotate
+from .scene import Scene
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """Data, not code. The body is given in the frame of the first gripper at its first pose.
+
+    Args:
+        name: of the scenario.
+        body: rest shape.
+        grasps: for every gripper the vertices ``(H_g,)`` that it holds rigidly.
+        motion: gripper poses in the world; of one pose only when nothing moves.
+        times: observation times ``(T,)`` [s]; the rollout starts at the first.
+        markers: weights ``(M, V)`` that give marker positions from vertex positions; rows sum to one.
+        load_vertices: where a recording's load hangs, shared equally.
+        load: [kg].
+        table_height: [m] or None.
+        settle: time that the object is given to come to rest before the first observation [s].
+    """
+
+    name: str
+    body: Body
+    grasps: tuple[IntArray, ...]
+    motion: Motion
+    times: FloatArray
+    markers: FloatArray
+    load_vertices: IntArray
+    load: float = 0.0
+    table_height: float | None = None
+    settle: float = 0.0
+
+    def __post_init__(self) -> None:
+        count = len(self.body.vertices)
+        for what, ids in [*((f"gripper {g}", v) for g, v in enumerate(self.grasps)), ("the load", self.load_vertices)]:
+            if len(ids) and (ids.min() < 0 or ids.max() >= count):
+                bad = int(ids.max() if ids.max() >= count else ids.min())
+                raise InputError(
+                    f"scenario {self.name!r}: {what} takes vertex {bad}, but the mesh has vertices 0 to {count - 1}"
+                )
+        if self.motion.grippers < len(self.grasps):
+            raise InputError(
+                f"scenario {self.name!r} has {len(self.grasps)} grippers, but the motion moves {self.motion.grippers}"
+            )
+        if self.markers.shape[1] != count:
+            raise InputError(
+                f"scenario {self.name!r}: marker weights are for {self.markers.shape[1]} vertices, mesh has {count}"
+            )
+        if self.load > 0 and not len(self.load_vertices):
+            raise InputError(f"scenario {self.name!r} says nowhere to hang a load of {self.load:g} kg")
+
+    def for_recording(self, recording: Recording, frames: slice = slice(None)) -> "Scenario":
+        """The same object under a recording's motion, load and observation times."""
+        motion = recording.gripper if recording.gripper is not None else self.motion
+        if motion.grippers < len(self.grasps):
+            raise InputError(
+                f"recording {recording.name!r} has poses of {motion.grippers} grippers, "
+                f"but scenario {self.name!r} holds the object with {len(self.grasps)}"
+            )
+        return replace(self, motion=motion, times=recording.series.time[frames], load=recording.load)
+
+    @property
+    def held(self) -> IntArray:
+        return np.concatenate([np.asarray(g, np.int64) for g in self.grasps]) if self.grasps else np.zeros(0, np.int64)
+
+    def world_vertices(self, scale: float = 1.0) -> FloatArray:
+        """Vertices ``(V, 3)`` [m] at the start; ``scale`` stretches about the first grasp."""
+        about = self.body.vertices[self.grasps[0]].mean(axis=0) if self.grasps else self.body.vertices.mean(axis=0)
+        pose = self.motion.at(self.times[:1])[0, 0]
+        return rotate(pose[3:], self.body.scaled(scale, about).vertices) + pose[:3]
+
+    def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
+        body = replace(self.body, vertices=self.world_vertices(scale))
+        loads = np.zeros(len(body.vertices))
+        if self.load > 0:
+            loads[self.load_vertices] = self.load / len(self.load_vertices)
+        return Scene(body, material, gravity, self.held, loads, self.table_height)
+
+    def held_positions(self, motion: Motion, times: FloatArray, vertices: FloatArray) -> FloatArray:
+        """Where the held vertices must be ``(T, H, 3)`` [m] when the grippers follow ``motion``.
+
+        Args:
+            vertices: world positions at the start ``(V, 3)``, from :meth:`world_vertices`.
+        """
+        start = motion.at(self.times[:1])[0]
+        poses = motion.at(times)
+        parts = []
+        for g, ids in enumerate(self.grasps):
+            local = rotate(inverse(start[g, 3:]), vertices[ids] - start[g, :3])
+            parts.append(rotate(poses[:, g, None, 3:], local[None]) + poses[:, g, None, :3])
+        return np.concatenate(parts, axis=1) if parts else np.zeros((len(times), 0, 3))
+
+
+def marker_weights(count: int, ids: IntArray) -> FloatArray:
+    """Weights ``(M, V)`` of markers that sit on vertices ``ids``."""
+    if len(ids) and (ids.min() < 0 or ids.max() >= count):
+        raise InputError(f"a marker sits on vertex {int(ids.max())}, but the mesh has vertices 0 to {count - 1}")
+    weights = np.zeros((len(ids), count))
+    weights[np.arange(len(ids)), ids] = 1.0
+    return weights
+
+
+def bound_markers(vertices: FloatArray, points: FloatArray, neighbours: int = 12) -> FloatArray:
+    """Weights ``(M, V)`` of markers that are carried rigidly by the object near ``points (M, 3)``.
+
+    Each marker is an affine combination of its nearest vertices, the one of smallest norm that
+    reproduces its position at rest: exact for every affine motion of the neighbourhood, so a marker
+    on a stalk turns with the surface.
+    """
+    weights = np.zeros((len(points), len(vertices)))
+    for m, p in enumerate(points):
+        near = np.argsort(np.linalg.norm(vertices - p, axis=1))[: min(neighbours, len(vertices))]
+        local = np.vstack([vertices[near].T - p[:, None], np.ones(len(near))])
+        weights[m, near] = np.linalg.pinv(local) @ np.array([0.0, 0.0, 0.0, 1.0])
+        if not np.allclose(weights[m] @ vertices, p, atol=1e-6):
+            raise InputError(
+                f"marker {m} at {np.round(p, 4).tolist()} m cannot be tied to the vertices near it, which lie in "
+                "one plane; give marker vertices in the study's [scenario] table instead"
+            )
+    return weights

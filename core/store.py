@@ -1,0 +1,128 @@
+"""Zarr v3 stores that xarray opens: dimension names, units, and nothing half-written.
+
+A single array write is atomic (zarr renames a finished file into place); a new store is built beside
+its final place and renamed there at the end, so a reader sees all of it or none.
+"""
+
+import contextlib
+import errno
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import zarr
+
+from .errors import InputError, MissingFileError, StoreError
+
+FORMAT = 1
+
+
+@contextlib.contextmanager
+def storage_errors(path: Path) -> Iterator[None]:
+    """Turn a full disk or a missing permission into one clear :class:`StoreError`."""
+    try:
+        yield
+    except OSError as error:
+        if isinstance(error, StoreError | MissingFileError):
+            raise
+        reason = {
+            errno.ENOSPC: "the disk is full; free some space and run the same command again",
+            errno.EDQUOT: "the disk quota is used up; free some space and run the same command again",
+            errno.EACCES: "no permission to write there",
+            errno.EROFS: "the file system is read-only",
+        }.get(error.errno or 0, str(error))
+        raise StoreError(f"cannot write {path}: {reason}") from error
+
+
+@contextlib.contextmanager
+def new_store(path: Path, *, overwrite: bool = False) -> Iterator[zarr.Group]:
+    """A new store that appears at ``path`` when the block ends well, and leaves nothing behind otherwise."""
+    if path.exists() and not overwrite:
+        raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
+    if path.exists() and not (path / "zarr.json").exists():
+        raise InputError(f"{path} exists and is not a Zarr store; it is not replaced")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    with storage_errors(path):
+        shutil.rmtree(partial, ignore_errors=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            root = zarr.open_group(partial, mode="w", zarr_format=3)
+            root.attrs["muslin_format"] = FORMAT
+            yield root
+            if path.exists():
+                shutil.rmtree(path)
+            partial.rename(path)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+
+
+def open_store(path: Path, mode: str = "r") -> zarr.Group:
+    """Open an existing store; ``mode`` is ``"r"`` or ``"r+"``."""
+    if not path.exists():
+        raise MissingFileError(f"there is no store at {path}")
+    try:
+        root = zarr.open_group(path, mode="r+" if mode == "r+" else "r", zarr_format=3)
+    except (FileNotFoundError, ValueError, KeyError) as error:
+        raise InputError(f"{path} is not a Zarr store that muslin wrote: {error}") from error
+    found = root.attrs.get("muslin_format")
+    if found != FORMAT:
+        raise InputError(f"{path} has format {found!r}, but this muslin reads format {FORMAT}")
+    return root
+
+
+def put(
+    group: zarr.Group,
+    name: str,
+    data: npt.ArrayLike,
+    dims: Sequence[str],
+    unit: str = "1",
+    description: str = "",
+    **attributes: Any,
+) -> zarr.Array[Any]:
+    """Write one array whole, replacing one of that name."""
+    values = np.asarray(data)
+    array = group.create_array(
+        name,
+        data=np.ascontiguousarray(values),
+        chunks=tuple(max(1, n) for n in values.shape),
+        dimension_names=tuple(dims),
+        overwrite=True,
+        attributes={"units": unit, "long_name": description or name, **attributes},
+    )
+    return array
+
+
+def empty_draws(
+    group: zarr.Group, name: str, shape: tuple[int, ...], dims: Sequence[str], unit: str, dtype: str, fill: float
+) -> zarr.Array[Any]:
+    """An array with one chunk a draw (first axis), all missing."""
+    return group.create_array(
+        name,
+        shape=shape,
+        dtype=dtype,
+        chunks=(1, *shape[1:]),
+        fill_value=fill,
+        dimension_names=tuple(dims),
+        overwrite=True,
+        attributes={"units": unit, "long_name": name},
+    )
+
+
+def subgroup(group: zarr.Group, name: str) -> zarr.Group:
+    """The child group; :class:`InputError` if there is none."""
+    child = group.get(name)
+    if not isinstance(child, zarr.Group):
+        raise InputError(f"store has no group {name!r}")
+    return child
+
+
+def read(group: zarr.Group, name: str) -> npt.NDArray[Any]:
+    """One whole array; :class:`InputError` if there is none of that name."""
+    array = group.get(name)
+    if not isinstance(array, zarr.Array):
+        raise InputError(f"store has no array {group.path}/{name}")
+    return np.asarray(array[...])

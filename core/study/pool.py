@@ -1,0 +1,128 @@
+"""Many rollouts over worker processes; results in order, failures as values."""
+
+import contextlib
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing import get_context
+from types import TracebackType
+
+from ..errors import RolloutFailed
+from ..rollout import Trajectory
+from .problem import Problem
+
+
+@dataclass(frozen=True)
+class Task:
+    """One rollout: parameter values and the recording whose motion is simulated."""
+
+    values: Mapping[str, float]
+    recording: str
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A rollout that did not end well, and why."""
+
+    reason: str
+
+
+Outcome = Trajectory | Failure
+
+_PROBLEM: Problem | None = None
+
+
+def _start_worker(problem: Problem) -> None:
+    global _PROBLEM
+    _PROBLEM = problem
+
+
+def _run(problem: Problem, task: Task) -> Outcome:
+    try:
+        return problem.simulate(task.values, task.recording)
+    except RolloutFailed as failure:
+        return Failure(str(failure))
+
+
+def _run_in_worker(task: Task) -> Outcome:
+    assert _PROBLEM is not None
+    return _run(_PROBLEM, task)
+
+
+class SimulationPool:
+    """Runs tasks of one problem. The outcome of a task depends on the task alone, not on the workers.
+
+    Args:
+        problem: sent to every worker once.
+        workers: processes; 1 runs in this process; None takes one a core.
+    """
+
+    def __init__(self, problem: Problem, workers: int | None = None) -> None:
+        self.problem = problem
+        self.workers = workers if workers is not None else (os.cpu_count() or 1)
+        self.count = 0  # rollouts run
+        self._executor: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> "SimulationPool":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._executor is not None:
+            self._executor.shutdown(wait=True, cancel_futures=True)
+            self._executor = None
+
+    def _open(self) -> ProcessPoolExecutor:
+        if self._executor is None:
+            # spawn: a fork of a process with engine or torch threads may hang
+            self._executor = ProcessPoolExecutor(
+                self.workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(self.problem,)
+            )
+        return self._executor
+
+    def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
+        """Outcomes in the order of ``tasks``. A worker that dies fails its task and is replaced."""
+        tasks = list(tasks)
+        self.count += len(tasks)
+        if self.workers == 1:
+            for task in tasks:
+                yield _run(self.problem, task)
+            return
+        futures: list[Future[Outcome]] = [self._open().submit(_run_in_worker, t) for t in tasks]
+        for k, future in enumerate(futures):
+            try:
+                yield future.result()
+            except BrokenProcessPool:
+                yield self._alone(tasks[k])
+                # whatever was queued behind the broken pool goes to a new one
+                for j in range(k + 1, len(tasks)):
+                    if futures[j].done() and futures[j].exception() is None:
+                        continue
+                    futures[j] = self._open().submit(_run_in_worker, tasks[j])
+
+    def _alone(self, task: Task) -> Outcome:
+        """Run a task that was in a pool that broke in a process of its own, to learn whether it was the cause."""
+        if self._executor is not None:
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor = None
+        with contextlib.closing(_OneShot(self.problem)) as one:
+            return one.run(task)
+
+
+class _OneShot:
+    def __init__(self, problem: Problem) -> None:
+        self._executor = ProcessPoolExecutor(
+            1, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(problem,)
+        )
+
+    def run(self, task: Task) -> Outcome:
+        try:
+            return self._executor.submit(_run_in_worker, task).result()
+        except BrokenProcessPool:
+            return Failure("the simulator took its process down")
+
+    def close(self) -> None:
+        self._executor.shutdown(wait=False, cancel_futures=True)

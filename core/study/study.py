@@ -1,0 +1,133 @@
+"""The study: one file that names everything, and one store that holds every result."""
+
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import zarr
+
+from ..errors import InputError, StepMissingError
+from ..measurement import Measurement
+from ..measurement_store import load_measurement
+from ..registry import REGISTRY
+from ..store import new_store, open_store
+from .config import StudyConfig, read_config, write_config
+from .pool import SimulationPool
+from .problem import Problem, build_problem
+
+#: ``(text, done, total)``: a line of progress; total 0 when it is not known.
+Progress = Callable[[str, int, int], None]
+
+
+def silent(text: str, done: int, total: int) -> None:
+    """The progress of a study that nobody watches."""
+
+
+class Study:
+    """A study and its results.
+
+    Steps are plugins (group ``muslin.steps``), so a study needs no torch until a step does.
+
+    Args:
+        config: checked content of the study file.
+        path: where the study file is, or would be; relative paths in it start there.
+        workers: worker processes; None takes one a core.
+        progress: called as work goes on.
+    """
+
+    def __init__(
+        self, config: StudyConfig, path: Path, *, workers: int | None = None, progress: Progress = silent
+    ) -> None:
+        self.config = config
+        self.path = path
+        self.workers = workers
+        self.progress = progress
+
+    @classmethod
+    def load(cls, path: str | Path, *, workers: int | None = None, progress: Progress = silent) -> "Study":
+        """Read a study file."""
+        return cls(read_config(Path(path)), Path(path), workers=workers, progress=progress)
+
+    def save(self) -> None:
+        write_config(self.config, self.path)
+
+    @property
+    def measurement_path(self) -> Path:
+        return self.path.parent / self.config.study.measurement
+
+    @property
+    def results_path(self) -> Path:
+        name = self.config.study.results or f"{self.path.stem}.results.zarr"
+        return self.path.parent / name
+
+    @cached_property
+    def measurement(self) -> Measurement:
+        return load_measurement(self.measurement_path)
+
+    @cached_property
+    def problem(self) -> Problem:
+        return build_problem(self.config, self.measurement)
+
+    def pool(self, problem: Problem | None = None) -> SimulationPool:
+        return SimulationPool(problem or self.problem, self.workers)
+
+    def fingerprint(self) -> dict[str, Any]:
+        """What the draws of a fit depend on; draws of another fingerprint are not continued."""
+        table = self.config.model_dump(mode="json", exclude={"diagnose"})
+        table["study"].pop("results", None)
+        table["study"].pop("hold_out", None)
+        return table
+
+    def results(self, mode: str = "r") -> zarr.Group:
+        """The results store; made empty on the first write."""
+        if mode != "r" and not self.results_path.exists():
+            with new_store(self.results_path) as root:
+                root.attrs["kind"] = "results"
+        if not self.results_path.exists():
+            raise StepMissingError(f"{self.path} has not been fitted yet; run: muslin fit {self.path}")
+        return open_store(self.results_path, mode)
+
+    def step_results(self, step: str) -> zarr.Group:
+        """Results of a finished step.
+
+        Raises:
+            StepMissingError: it has not been run to its end.
+        """
+        group = self.results().get(step)
+        if not isinstance(group, zarr.Group) or not group.attrs.get("finished"):
+            raise StepMissingError(f"{self.path} has no result of {step!r} yet; run: muslin {step} {self.path}")
+        return group
+
+    def fit(self) -> Any:
+        """Fit; see the step ``fit``. Continues from the draws of an interrupted run."""
+        return REGISTRY.get("step", "fit")(self)
+
+    def compare(self) -> Any:
+        """Hold the fitted model against every recording; see the step ``compare``."""
+        return REGISTRY.get("step", "compare")(self)
+
+    def diagnose(self) -> Any:
+        """Say which effect is missing; see the step ``diagnose``."""
+        return REGISTRY.get("step", "diagnose")(self)
+
+    def add(self, effect: str, output: str | Path | None = None) -> "Study":
+        """A study of the same model with one more effect, its coefficients inferred.
+
+        Args:
+            effect: name of an effect plugin.
+            output: the new study file, in the same folder; default ``STEM-with-EFFECT.toml``.
+        """
+        REGISTRY.get("effect", effect)
+        if effect in self.config.effects:
+            raise InputError(f"{self.path} has {effect!r} already")
+        path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")
+        config = self.config.model_copy(deep=True)
+        config.effects[effect] = {}
+        if config.study.results is not None:
+            config.study.results = f"{path.stem}.results.zarr"
+        if path.parent.resolve() != self.path.parent.resolve():
+            config.study.measurement = str(self.measurement_path.resolve())
+        study = Study(config, path, workers=self.workers, progress=self.progress)
+        study.save()
+        return study

@@ -1,0 +1,1 @@
+"""Posterior estimators, the sequential loop and criticism."""

@@ -1,0 +1,120 @@
+"""One candidate effect: screened over its prior, refitted jointly with the parameters, held out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import stats
+
+from ...core.arrays import FloatArray
+from ...core.parameters import ParameterSpace
+from ..polish import Objective, Polished
+
+#: A coefficient that a motion shows is known to this share of its prior range, or better: a typical
+#: effect is a quarter of the range, and a third of that is three standard deviations away from zero.
+VISIBLE = 1.0 / 12.0
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A model with one more effect.
+
+    Args:
+        name: of the effect.
+        space: parameters and coefficients.
+        base: number of parameters that are not coefficients of this effect.
+        fit: jointly polished, in units of the noise.
+        rss: residual sum of squares.
+        held_out: root mean square error on each held-out recording [unit].
+    """
+
+    name: str
+    space: ParameterSpace
+    base: int
+    fit: Polished
+    held_out: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def rss(self) -> float:
+        return self.fit.rss
+
+    @property
+    def coefficients(self) -> dict[str, tuple[float, float, str]]:
+        """Mean, standard deviation and unit of every coefficient."""
+        low = np.array([p.low for p in self.space])
+        span = np.array([p.high for p in self.space]) - low
+        sd = np.sqrt(np.diag(self.fit.covariance)) * np.sqrt(max(1.0, self.rss / len(self.fit.white)))
+        return {
+            p.name.split(".", 1)[1]: (float(low[k] + span[k] * self.fit.unit[k]), float(span[k] * sd[k]), p.unit)
+            for k, p in enumerate(self.space)
+            if k >= self.base
+        }
+
+    @property
+    def visible(self) -> bool:
+        """Would these data show a typical strength of this effect, whatever the parameters are?
+
+        True if the best determined coefficient is known well enough.
+        """
+        sd = np.sqrt(np.diag(self.fit.covariance))[self.base :]
+        return bool(sd.min() < VISIBLE)
+
+    @property
+    def surviving(self) -> float:
+        """Share of the effect's sensitivity left after projecting off the other parameters."""
+        j = self.fit.jacobian
+        effect, others = j[:, self.base :], j[:, : self.base]
+        total = float(np.linalg.norm(effect))
+        if total < 1e-9:
+            return 0.0
+        basis, _ = np.linalg.qr(others)
+        return float(np.linalg.norm(effect - basis @ (basis.T @ effect)) / total)
+
+
+def effect_start(space: ParameterSpace, base: int, plain: FloatArray) -> FloatArray:
+    """The plain fit in the larger cube: every coefficient zero."""
+    zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(space)[base:]])
+    return np.concatenate([plain, zero])
+
+
+def screening_points(
+    space: ParameterSpace, base: int, starts: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Where a refit may start ``(count, D)``: coefficients space-filling over their prior.
+
+    The other parameters come from ``starts (K, base)``, the plain fit among them, and for every other
+    point from anywhere in the prior: a missing effect may have driven the plain fit far away.
+    """
+    sobol = stats.qmc.Sobol(len(space), rng=rng)
+    points = np.asarray(sobol.random_base2(int(np.ceil(np.log2(count)))))[:count]
+    anchored = np.arange(count) % 2 == 0
+    points[anchored, :base] = starts[rng.integers(len(starts), size=int(anchored.sum()))]
+    points[0, :base] = starts[0]
+    return np.asarray(points)
+
+
+def best_starts(objective: Objective, points: FloatArray) -> list[FloatArray]:
+    """``points`` from the smallest residual to the largest."""
+    sizes = [float(w @ w) for w in objective.many(points)]
+    return [points[k] for k in np.argsort(sizes)]
+
+
+def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
+    """Significance of the drop in residual, as standard deviations of a normal, Holm-corrected for ``tried``.
+
+    The likelihood ratio is scaled by what the candidate itself leaves unexplained, so that a model that
+    is wrong anyway does not make every effect significant.
+    """
+    scale = max(1.0, candidate.rss / len(candidate.fit.white))
+    drop = max(0.0, rss_without - candidate.rss) / scale
+    log_p = stats.chi2.logsf(drop, len(candidate.space) - candidate.base) + np.log(tried)
+    if log_p > -1e-3:
+        return 0.0
+    if log_p > -600:
+        return float(stats.norm.isf(np.exp(log_p) / 2))
+    return float(np.sqrt(drop))  # the normal tail, far out: log p -> -z^2 / 2
+
+
+def summary(values: Sequence[float]) -> float:
+    """Root mean square of root mean squares."""
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")

@@ -1,0 +1,260 @@
+"""The step ``diagnose``: which physical effect is missing from the model?"""
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.errors import InputError
+from ...core.parameters import ParameterSpace
+from ...core.registry import REGISTRY
+from ...core.rollout import Trajectory
+from ...core.store import put, read, storage_errors
+from ...core.study import Problem, SimulationPool, Study, Task
+from ..fitting import FitResult, load_fit, offsets_of
+from ..polish import Objective, Polished, polish
+from ..residuals import residual
+from .candidate import Candidate, best_starts, effect_start, screening_points, summary
+from .sentences import explain
+from .verdict import Decision, Evidence, decide, has_misfit
+
+#: Effects that one diagnosis may name, one after the other.
+MOST_EFFECTS = 2
+#: Least-squares evaluations for a candidate.
+EVALUATIONS = 10
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What :func:`diagnose` found: the JSON of ``muslin diagnose --json`` and a text for people."""
+
+    result: dict[str, Any]
+    paragraphs: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        return self.result
+
+    def text(self) -> str:
+        return "\n".join(self.paragraphs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """The model so far, its best fit, and every candidate beside it."""
+
+    effects: tuple[str, ...]
+    plain: Polished
+    evidence: Evidence
+    decision: Decision
+
+
+def diagnose(study: Study) -> Diagnosis:
+    """Refit the model with each candidate effect and say what that shows."""
+    began = time.monotonic()
+    fit = load_fit(study)
+    names = candidate_names(study)
+    effects = {n: REGISTRY.get("effect", n) for n in names}
+    problem = replace(study.problem, effects={**study.problem.effects, **effects})
+    with study.pool(problem) as pool:
+        work = _Work(study, problem, pool, fit)
+        stages = [work.stage((), names, _fitted(study))]
+        while (
+            stages[-1].decision.verdict == "named"
+            and len(stages) < MOST_EFFECTS
+            and has_misfit(replace(stages[-1].evidence, rss_plain=_chosen(stages[-1]).rss))
+        ):
+            chosen = _chosen(stages[-1])
+            done = (*stages[-1].effects, chosen.name)
+            rest = [n for n in names if n not in done]
+            stages.append(work.stage(done, rest, chosen.fit))
+        named = tuple(e for s in stages if s.decision.verdict == "named" for e in s.decision.effects)
+        after = _last_model(stages)
+        curves = work.curves(stages[0], after)
+        count = pool.count
+    result = _result(study, stages, named, after, work, count, time.monotonic() - began)
+    paragraphs = explain(result, effects, stages[0].evidence, len(problem.hold_out))
+    with storage_errors(study.results_path):
+        group = study.results("r+").create_group("diagnose", overwrite=True)
+        for name, arrays in curves.items():
+            sub = group.create_group(name)
+            for key, (data, dims, unit) in arrays.items():
+                put(sub, key, data, dims, unit)
+        group.attrs.update({"result": result, "text": list(paragraphs), "finished": True})
+    return Diagnosis(result, tuple(paragraphs))
+
+
+def candidate_names(study: Study) -> list[str]:
+    """The effects to try: those of the study file, or all installed ones that fit the object and are not in yet."""
+    kind = study.problem.material.kind
+    told = study.config.diagnose.candidates
+    names = told if told is not None else REGISTRY.names("effect")
+    out = []
+    for name in names:
+        effect = REGISTRY.get("effect", name)
+        if name not in study.config.effects and kind in effect.object_kinds:
+            out.append(name)
+    if not out:
+        raise InputError(f"{study.path}: no candidate effect is left to try; see: muslin plugins")
+    return out
+
+
+class _Work:
+    """Everything that stages share."""
+
+    def __init__(self, study: Study, problem: Problem, pool: SimulationPool, fit: FitResult) -> None:
+        self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
+        self.offsets = offsets_of(study)
+        self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
+
+    def space(self, effects: tuple[str, ...]) -> ParameterSpace:
+        return self.problem.with_effects(*effects).space
+
+    def objective(self, effects: tuple[str, ...]) -> Objective:
+        return Objective(self.pool, self.space(effects), self.problem.fit_on, self.fit.noise, self.offsets)
+
+    def stage(self, effects: tuple[str, ...], names: list[str], plain: Polished | FloatArray) -> _Stage:
+        objective = self.objective(effects)
+        if not isinstance(plain, Polished):
+            plain = polish(objective, plain, 2)
+        candidates = []
+        for k, name in enumerate(names):
+            self.study.progress(f"trying {name}", k, len(names))
+            candidates.append(self.refit((*effects, name), plain))
+        self.study.progress("candidates tried", len(names), len(names))
+        best = min(candidates, key=lambda c: c.rss)
+        if best.rss < plain.rss:
+            # the plain model gets the best candidate's start too, or a better start would pass for an effect
+            again = polish(objective, best.fit.unit[: len(objective.space)], EVALUATIONS)
+            plain = min(plain, again, key=lambda p: p.rss)
+        candidates = [replace(c, held_out=self.held_out(c.space, c.fit.unit)) for c in candidates]
+        evidence = Evidence(
+            rss_plain=plain.rss,
+            count=len(plain.white) - len(objective.space),
+            held_out_plain=summary(list(self.held_out(objective.space, plain.unit).values())),
+            noise_sd=self.fit.noise.sd,
+            noise_error=self.fit.noise.relative_error,
+            candidates=tuple(candidates),
+        )
+        return _Stage(effects, plain, evidence, decide(evidence))
+
+    def refit(self, effects: tuple[str, ...], plain: Polished) -> Candidate:
+        objective = self.objective(effects)
+        base = len(plain.unit)
+        # own stream for every candidate, whatever the others are
+        rng = np.random.default_rng([self.study.config.study.seed, 47, *effects[-1].encode()])
+        starts = plain.unit[None]
+        if len(effects) == 1:
+            starts = np.vstack([starts, self.starts])
+        points = screening_points(objective.space, base, starts, self.study.config.diagnose.draws, rng)
+        points = np.vstack([effect_start(objective.space, base, plain.unit), points])
+        first = polish(objective, best_starts(objective, points)[0], EVALUATIONS)
+        return Candidate(effects[-1], objective.space, base, first)
+
+    def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
+        values = space.as_dict(space.from_unit(unit))
+        names = self.problem.hold_out
+        out = {}
+        for name, outcome in zip(names, self.pool.map([Task(values, n) for n in names]), strict=True):
+            out[name] = (
+                residual(self.problem.recordings[name], outcome.series, self.fit.noise, self.offsets).rms
+                if isinstance(outcome, Trajectory)
+                else float("inf")
+            )
+        return out
+
+    def fitted_error(self, polished: Polished) -> float:
+        """Root mean square on the fitted recordings [unit]."""
+        return float(np.sqrt(polished.rss / len(polished.white)) * self.fit.noise.sd)
+
+    def curves(self, first: _Stage, after: Candidate) -> dict[str, dict[str, tuple[Any, list[str], str]]]:
+        """Error over time and shape, before and after, for the report."""
+        spaces = [(self.space(()), first.plain.unit), (after.space, after.fit.unit)]
+        names = [*self.problem.fit_on, *self.problem.hold_out]
+        tasks = [Task(s.as_dict(s.from_unit(u)), n) for n in names for s, u in spaces]
+        outcomes = list(self.pool.map(tasks))
+        out: dict[str, dict[str, tuple[Any, list[str], str]]] = {}
+        for k, name in enumerate(names):
+            recording = self.problem.recordings[name]
+            before, later = outcomes[2 * k], outcomes[2 * k + 1]
+            if not (isinstance(before, Trajectory) and isinstance(later, Trajectory)):
+                continue
+            unit = recording.series.unit
+            errors = [
+                np.sqrt(
+                    np.nanmean(
+                        residual(recording, o.series, self.fit.noise, self.offsets).difference ** 2, axis=(1, 2)
+                    )
+                )
+                for o in (before, later)
+            ]
+            out[name] = {
+                "time": (recording.series.time, ["time"], "s"),
+                "error_before": (errors[0], ["time"], unit),
+                "error_after": (errors[1], ["time"], unit),
+                "predicted_before": (before.series.points, ["time", "predicted_point", "axis"], unit),
+                "predicted_after": (later.series.points, ["time", "predicted_point", "axis"], unit),
+                "vertices_before": (before.vertices, ["time", "vertex", "axis"], "m"),
+                "vertices_after": (later.vertices, ["time", "vertex", "axis"], "m"),
+            }
+        return out
+
+
+def _fitted(study: Study) -> FloatArray:
+    return read(study.step_results("fit"), "estimate_unit")
+
+
+def _chosen(stage: _Stage) -> Candidate:
+    return next(c for c in stage.evidence.candidates if c.name == stage.decision.effects[0])
+
+
+def _last_model(stages: list[_Stage]) -> Candidate:
+    """The model with what was named; where nothing was, the candidate that came nearest."""
+    named = [s for s in stages if s.decision.verdict == "named"]
+    if named:
+        return _chosen(named[-1])
+    return min(stages[0].evidence.candidates, key=lambda c: c.rss)
+
+
+def _result(
+    study: Study,
+    stages: list[_Stage],
+    named: tuple[str, ...],
+    after: Candidate,
+    work: _Work,
+    count: int,
+    seconds: float,
+) -> dict[str, Any]:
+    first = stages[0]
+    e = first.evidence
+    held = np.isfinite(e.held_out_plain)
+    before = e.held_out_plain if held else work.fitted_error(first.plain)
+    later = summary(list(after.held_out.values())) if held else work.fitted_error(after.fit)
+    rows = []
+    for c in sorted(e.candidates, key=lambda c: c.rss):
+        rows.append(
+            {
+                "name": c.name,
+                "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in c.coefficients.items()},
+                "explained": e.explained(c),
+                "z": e.z(c),
+                "held_out_before": e.held_out_plain if held else None,
+                "held_out_after": e.held_out(c) if held else None,
+                "identifiability": c.surviving if c.visible else 0.0,
+            }
+        )
+    return {
+        "verdict": first.decision.verdict,
+        "effects": list(named or first.decision.effects),
+        "candidates": rows,
+        "error": {
+            "noise": work.fit.noise.sd,
+            "before": before,
+            "after": later if named else before,
+            "unit": work.fit.noise.unit,
+        },
+        "simulations": count,
+        "seconds": seconds,
+        "seed": study.config.study.seed,
+    }

@@ -1,0 +1,112 @@
+"""From refitted candidates to one of five verdicts."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from .candidate import Candidate, summary, z_value
+
+Verdict = Literal["named", "tied", "none", "cannot-tell", "no-misfit"]
+
+#: An effect is named only if it explains at least this share of the excess misfit ...
+EXPLAINS = 0.5
+#: ... with at least this significance [standard deviations] ...
+SIGNIFICANT = 4.0
+#: ... and rivals are worse by more than this in -2 log likelihood (a Bayes factor of about 150) ...
+MARGIN = 10.0
+#: ... and by more than this share of what the best one leaves unexplained.
+SHARE_LEFT = 0.5
+#: Misfit that is not worth an explanation: excess over the noise variance, as a share of it.
+NEGLIGIBLE = 0.10
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What decides.
+
+    Args:
+        rss_plain: residual sum of squares of the model as it is [noise variances].
+        count: of residuals.
+        held_out_plain: root mean square error on held-out recordings [unit]; NaN if there are none.
+        noise_sd: [unit].
+        noise_error: relative standard error of ``noise_sd``.
+        candidates: refitted.
+    """
+
+    rss_plain: float
+    count: int
+    held_out_plain: float
+    noise_sd: float
+    noise_error: float
+    candidates: tuple[Candidate, ...]
+
+    @property
+    def floor(self) -> float:
+        """The residual sum of squares that the noise leaves, or the best candidate if that is less."""
+        return min([float(self.count), *(c.rss for c in self.candidates)])
+
+    @property
+    def excess(self) -> float:
+        return max(self.rss_plain - self.floor, 1e-9)
+
+    def explained(self, candidate: Candidate) -> float:
+        """Share of the excess misfit that goes away with the candidate, 0 to 1."""
+        return float(np.clip((self.rss_plain - candidate.rss) / self.excess, 0.0, 1.0))
+
+    def z(self, candidate: Candidate) -> float:
+        return z_value(self.rss_plain, candidate, len(self.candidates))
+
+    def held_out(self, candidate: Candidate) -> float:
+        return summary(list(candidate.held_out.values()))
+
+    def better_held_out(self, candidate: Candidate) -> bool:
+        """The excess error on motions it was not fitted to falls; true if there are none to ask."""
+        if not np.isfinite(self.held_out_plain):
+            return True
+        return self.held_out(candidate) < self.held_out_plain
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict and the effects that it is about, best first."""
+
+    verdict: Verdict
+    effects: tuple[str, ...]
+
+
+def has_misfit(e: Evidence) -> bool:
+    """Is there more misfit than the noise, and its own uncertainty, explain?"""
+    allowed = max(NEGLIGIBLE, 6 * e.noise_error + 4 * np.sqrt(2 / e.count))
+    return e.rss_plain / e.count > 1 + allowed
+
+
+def decide(e: Evidence) -> Decision:
+    """The five verdicts, in the order in which they are ruled out."""
+    passing = [
+        c
+        for c in e.candidates
+        if e.z(c) >= SIGNIFICANT and e.explained(c) >= EXPLAINS and e.better_held_out(c) and _moved(c)
+    ]
+    passing.sort(key=lambda c: c.rss)
+    if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
+        seen = sum(c.visible for c in e.candidates)
+        return Decision("no-misfit" if 2 * seen >= len(e.candidates) else "cannot-tell", ())
+    if not passing:
+        return Decision("none", ())
+    best = passing[0]
+    left = max(0.0, best.rss - e.count)
+    rivals = [c for c in passing[1:] if c.rss - best.rss < MARGIN + SHARE_LEFT * left]
+    if rivals:
+        return Decision("tied", (best.name, *(c.name for c in rivals)))
+    return Decision("named", (best.name,))
+
+
+def _moved(candidate: Candidate) -> bool:
+    """At least one coefficient is away from zero by more than its uncertainty allows."""
+    return any(abs(mean) > 2 * sd for mean, sd, _ in candidate.coefficients.values())
+
+
+def _clear_gain(e: Evidence, candidate: Candidate) -> bool:
+    """A gain so significant that it is a misfit, though the total is within what the noise may be."""
+    return e.z(candidate) > 2 * SIGNIFICANT and np.isfinite(e.held_out_plain)

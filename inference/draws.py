@@ -1,0 +1,97 @@
+"""Simulated draws on disk: one chunk a draw, whole or absent, so that a killed fit goes on."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import zarr
+
+from ..core.arrays import FloatArray
+from ..core.errors import StoreError
+from ..core.rollout import Trajectory
+from ..core.store import empty_draws, put, storage_errors
+from ..core.study import Outcome, Problem, Study
+
+ABSENT, WHOLE, FAILED = 0, 1, 2
+
+
+class DrawStore:
+    """The draws of one fit, in the order in which they were proposed.
+
+    The status of a draw is written last: a draw whose status is absent does not exist, whatever else
+    of it reached the disk.
+
+    Args:
+        study: whose results store is used.
+        problem: what is simulated.
+        count: draws in all rounds together.
+    """
+
+    def __init__(self, study: Study, problem: Problem, count: int) -> None:
+        self._path = study.results_path
+        self._recordings = list(problem.fit_on)
+        root = study.results("r+")
+        fingerprint = study.fingerprint()
+        fit = root.require_group("fit")
+        if fit.attrs.get("fingerprint") != fingerprint:
+            with storage_errors(self._path):
+                fit = self._create(root, problem, count, fingerprint)
+        self.group: zarr.Group = fit
+        self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
+        self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
+        self.status = np.asarray(self._draws["status"][...])
+
+    @staticmethod
+    def _create(root: zarr.Group, problem: Problem, count: int, fingerprint: dict[str, Any]) -> zarr.Group:
+        for name in ("fit", "compare", "diagnose"):  # results of another model or measurement
+            if name in root:
+                del root[name]
+        fit = root.create_group("fit")
+        draws = fit.create_group("draws")
+        draws.attrs["parameters"] = list(problem.space.names)
+        empty_draws(draws, "theta", (count, len(problem.space)), ["draw", "parameter"], "unit cube", "float64", np.nan)
+        for name in problem.fit_on:
+            series = problem.recordings[name].series
+            points = len(problem.scenarios[name].markers)
+            put(draws, f"time_{name}", series.time, [f"time_{name}"], "s")
+            shape = (count, series.frames, points, series.points.shape[2])
+            dims = ["draw", f"time_{name}", "point", "axis"]
+            empty_draws(draws, _array(name), shape, dims, series.unit, "float32", np.nan)
+        empty_draws(draws, "status", (count,), ["draw"], "1", "int8", ABSENT)
+        fit.attrs["failures"] = {}
+        fit.attrs["fingerprint"] = fingerprint  # last: a store without it is made anew
+        return fit
+
+    def write(self, draw: int, theta: FloatArray, outcomes: Mapping[str, Outcome]) -> None:
+        """Write one draw: all its recordings, or the reason why one of them failed."""
+        with storage_errors(self._path):
+            self._draws["theta"][draw] = theta
+            reasons = [o.reason for o in outcomes.values() if not isinstance(o, Trajectory)]
+            if reasons:
+                self.group.attrs["failures"] = {**self._failures(), str(draw): reasons[0]}
+            else:
+                for name, outcome in outcomes.items():
+                    assert isinstance(outcome, Trajectory)
+                    self._points[name][draw] = outcome.series.points.astype(np.float32)
+            self._draws["status"][draw] = FAILED if reasons else WHOLE
+        self.status[draw] = FAILED if reasons else WHOLE
+
+    def _failures(self) -> dict[str, str]:
+        return {str(k): str(v) for k, v in dict(self.group.attrs.get("failures", {})).items()}  # type: ignore[call-overload]
+
+    def failures(self) -> list[str]:
+        """Reasons of the draws that failed."""
+        return list(self._failures().values())
+
+    def read(self, upto: int) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+        """Whole draws among the first ``upto``: unit parameters, points a recording, and their numbers."""
+        if (self.status[:upto] == ABSENT).any():
+            raise StoreError(f"{self._path}: a draw of an earlier round is missing")
+        whole = np.flatnonzero(self.status[:upto] == WHOLE)
+        theta = np.asarray(self._draws["theta"][:upto])[whole]
+        points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self._recordings]
+        return theta, points, whole.astype(float)
+
+
+def _array(recording: str) -> str:
+    return f"points_{recording}"

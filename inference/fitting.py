@@ -1,0 +1,250 @@
+"""The step ``fit``: sequential simulation-based inference, then a least-squares polish."""
+
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.arrays import FloatArray
+from ..core.errors import InputError, MuslinError
+from ..core.estimator import Posterior, PosteriorEstimator
+from ..core.parameters import ParameterSpace
+from ..core.registry import REGISTRY
+from ..core.series import PointSeries
+from ..core.store import put, read, storage_errors
+from ..core.study import Study, Task
+from .draws import ABSENT, DrawStore
+from .noise import Noise, estimate_noise
+from .observe import Observer
+from .polish import Objective, polish
+from .residuals import Offsets, residual
+
+#: Share of every later round's proposal that is still the prior. It bounds the importance weights
+#: p / p~ by the inverse of the prior's share of all draws.
+DEFENSIVE = 0.2
+#: Posterior mass within 2 % of a bound above which the prior box looks too small.
+AT_BOUND = 0.3
+SAMPLES = 2000
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """What a fit found.
+
+    Args:
+        names, units: of the parameters.
+        estimate, sd: best fit and its standard deviation ``(D,)`` [units].
+        samples: posterior draws ``(S, D)`` [units].
+        noise: of the measurement.
+        at_bound: parameters whose posterior is piled on a bound of the prior.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    estimate: FloatArray
+    sd: FloatArray
+    samples: FloatArray
+    noise: Noise
+    at_bound: tuple[str, ...]
+    simulations: int
+    failed: int
+    seconds: float
+
+    def values(self) -> dict[str, float]:
+        """The best fit by name."""
+        return dict(zip(self.names, self.estimate.tolist(), strict=True))
+
+    def text(self) -> str:
+        """A few lines for people."""
+        lines = [f"fitted with {self.simulations} simulations in {self.seconds:.0f} s, {self.failed} failed"]
+        mean, spread = self.samples.mean(axis=0), self.samples.std(axis=0)
+        for k, name in enumerate(self.names):
+            lines.append(
+                f"  {name}: best fit {self.estimate[k]:.4g} ± {self.sd[k]:.2g} {self.units[k]}, "
+                f"posterior {mean[k]:.4g} ± {spread[k]:.2g}"
+            )
+        lines.append(f"  noise {self.noise.sd * 1e3:.3g} mm a coordinate ({self.noise.source})")
+        for name in self.at_bound:
+            lines.append(f"  warning: {name} lies on a bound of its prior; widen [parameters.{name}] and fit again")
+        return "\n".join(lines)
+
+
+def offsets_of(study: Study) -> Offsets:
+    """Nuisance priors of a study."""
+    return Offsets(study.config.nuisance.clock_offset, study.config.nuisance.constant_offset)
+
+
+def fit(study: Study) -> FitResult:
+    """Fit a study: continue from the draws that its store has, or return the finished result."""
+    problem, config = study.problem, study.config
+    rounds, per_round = config.estimator.rounds, config.estimator.draws
+    noise = estimate_noise(problem, config.noise.sd)
+    store = DrawStore(study, problem, rounds * per_round)
+    if store.group.attrs.get("finished"):
+        return load_fit(study)
+    began = time.monotonic()
+    observer = Observer([problem.recordings[r] for r in problem.fit_on], noise, offsets_of(study))
+    density: list[Posterior] = []
+    with study.pool(problem) as pool:
+        for k in range(rounds):
+            proposal = _propose(density, per_round, len(problem.space), np.random.default_rng([config.study.seed, k]))
+            first = k * per_round
+            missing = [i for i in range(per_round) if store.status[first + i] == ABSENT]
+            tasks = [
+                Task(problem.space.as_dict(problem.space.from_unit(proposal[i])), r)
+                for i in missing
+                for r in problem.fit_on
+            ]
+            outcomes = pool.map(tasks)
+            for done, i in enumerate(missing):
+                store.write(first + i, proposal[i], {r: next(outcomes) for r in problem.fit_on})
+                study.progress(
+                    f"round {k + 1} of {rounds}: simulating", per_round - len(missing) + done + 1, per_round
+                )
+            theta, points, numbers = store.read(first + per_round)
+            if len(theta) < max(10, 0.1 * (first + per_round)):
+                raise MuslinError(_too_many_failed(store, first + per_round))
+            study.progress(f"round {k + 1} of {rounds}: training {config.estimator.name}", 0, 0)
+            density.append(_train(study, observer, theta, points, numbers, density, k))
+        study.progress("polishing the best draw by least squares", 0, 0)
+        units = problem.space
+        objective = Objective(pool, units, problem.fit_on, noise, offsets_of(study))
+        before = pool.count
+        best = polish(objective, _best_draw(study, store, noise))
+        simulations = rounds * per_round * len(problem.fit_on) + pool.count - before
+    samples = density[-1].sample(SAMPLES, np.random.default_rng([config.study.seed, rounds]))
+    estimate = units.from_unit(best.unit)
+    sd = physical_sd(units, best.unit, best.covariance)
+    near = ((samples < 0.02) | (samples > 0.98)).mean(axis=0) > AT_BOUND
+    near |= (best.unit < 0.01) | (best.unit > 0.99)
+    with storage_errors(study.results_path):
+        group = store.group
+        put(group, "posterior_samples", units.from_unit(samples), ["sample", "parameter"])
+        put(group, "posterior_log_prob", density[-1].log_prob(samples), ["sample"], "log density on the unit cube")
+        put(group, "posterior_file", _file_bytes(density[-1]), ["byte"], "1", "the posterior, as its estimator saves it")
+        put(group, "estimate", estimate, ["parameter"])
+        put(group, "estimate_sd", sd, ["parameter"])
+        put(group, "estimate_unit", best.unit, ["parameter"], "unit cube")
+        put(group, "estimate_covariance", best.covariance, ["parameter", "parameter_2"], "unit cube")
+        group.attrs.update(
+            {
+                "parameters": list(units.names),
+                "units": list(units.units),
+                "low": [p.low for p in units],
+                "high": [p.high for p in units],
+                "scale": [p.scale for p in units],
+                "seed": config.study.seed,
+                "rounds": rounds,
+                "simulations": simulations,
+                "failed": len(store.failures()),
+                "seconds": time.monotonic() - began,
+                "engine": problem.simulator.engine_version(),
+                "estimator": config.estimator.name,
+                "noise": noise.as_dict(),
+                "at_bound": [n for n, bad in zip(units.names, near, strict=True) if bad],
+            }
+        )
+        group.attrs["finished"] = True
+    return load_fit(study)
+
+
+def load_fit(study: Study) -> FitResult:
+    """The result of a finished fit."""
+    group = study.step_results("fit")
+    a: dict[str, Any] = dict(group.attrs)
+    return FitResult(
+        names=tuple(a["parameters"]),
+        units=tuple(a["units"]),
+        estimate=read(group, "estimate"),
+        sd=read(group, "estimate_sd"),
+        samples=read(group, "posterior_samples"),
+        noise=Noise(**a["noise"]),
+        at_bound=tuple(a["at_bound"]),
+        simulations=int(a["simulations"]),
+        failed=int(a["failed"]),
+        seconds=float(a["seconds"]),
+    )
+
+
+def physical_sd(space: ParameterSpace, unit: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviations ``(D,)`` [units] from a covariance in the unit cube, to first order."""
+    step = 1e-4
+    slope = (space.from_unit(unit + step) - space.from_unit(unit - step)) / (2 * step)
+    return np.asarray(np.abs(slope) * np.sqrt(np.diag(covariance)))
+
+
+def _propose(density: list[Posterior], count: int, dimension: int, rng: np.random.Generator) -> FloatArray:
+    """Round 0 from the prior; later ones from the latest posterior, with a share of the prior."""
+    prior = rng.random((count, dimension))
+    if not density:
+        return prior
+    take = rng.random(count) >= DEFENSIVE
+    return np.asarray(np.where(take[:, None], density[-1].sample(count, rng), prior))
+
+
+def _log_weights(theta: FloatArray, proposals: list[Posterior]) -> FloatArray:
+    """log p / p~, with p~ the mixture of the proposals of all rounds (balance heuristic).
+
+    p is one on the unit cube. Every proposal is a density on the cube, so nothing leaves the positive
+    definite cone as it does when Gaussians are divided.
+    """
+    share = np.ones(len(theta))  # round 0: the prior
+    for proposal in proposals:
+        share += DEFENSIVE + (1 - DEFENSIVE) * np.exp(proposal.log_prob(theta))
+    return np.asarray(-np.log(share / (1 + len(proposals))))
+
+
+def _train(
+    study: Study,
+    observer: Observer,
+    theta: FloatArray,
+    points: list[FloatArray],
+    numbers: FloatArray,
+    proposals: list[Posterior],
+    round_number: int,
+) -> Posterior:
+    table = study.config.estimator
+    options = dict(table.options)
+    if not all(r.series.correspondence for r in observer.recordings):
+        options.setdefault("correspondence", False)
+    try:
+        estimator: PosteriorEstimator = REGISTRY.get("estimator", table.name)(**options)
+    except TypeError as error:
+        raise InputError(f"[estimator] {table.name!r} does not take these options: {error}") from error
+    flawed = observer.observe(points, numbers, study.config.study.seed)
+    weights = _log_weights(theta, proposals) if proposals else None
+    estimator.fit(theta, flawed, log_weights=weights, seed=study.config.study.seed + round_number)
+    return estimator.posterior(observer.measured())
+
+
+def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:
+    problem = study.problem
+    theta, points, _ = store.read(len(store.status))
+    total = np.zeros(len(theta))
+    for name, simulated in zip(problem.fit_on, points, strict=True):
+        recording = problem.recordings[name]
+        for k, p in enumerate(simulated):
+            series = PointSeries(recording.series.time, p, recording.series.unit, recording.series.correspondence)
+            white = residual(recording, series, noise, offsets_of(study)).white
+            total[k] += float(white @ white)
+    return theta[int(np.argmin(total))]
+
+
+def _too_many_failed(store: DrawStore, count: int) -> str:
+    reasons = Counter(r.split(" at ")[0] for r in store.failures()).most_common(3)
+    return (
+        f"{len(store.failures())} of {count} draws failed: "
+        + "; ".join(f"{n} times {reason!r}" for reason, n in reasons)
+        + ". Narrow the priors in [parameters] or lower [simulator] time_step, then fit again"
+    )
+
+
+def _file_bytes(posterior: Posterior) -> FloatArray:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "posterior.npz"
+        posterior.save(path)
+        return np.frombuffer(path.read_bytes(), dtype=np.uint8)

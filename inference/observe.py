@@ -1,0 +1,59 @@
+"""What a camera would have made of a simulated draw: noise, offsets, and points not seen."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..core.arrays import FloatArray
+from ..core.measurement import Recording
+from .noise import Noise
+from .residuals import Offsets
+
+
+class Observer:
+    """Gives simulated points the flaws of the measurement, so that an estimator learns to see through them.
+
+    Args:
+        recordings: in the order of the point arrays.
+        noise: of the measurement.
+        offsets: prior standard deviations of clock and position.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], noise: Noise, offsets: Offsets) -> None:
+        self.recordings, self.noise, self.offsets = list(recordings), noise, offsets
+
+    def observe(self, points: Sequence[FloatArray], numbers: FloatArray, seed: int) -> list[FloatArray]:
+        """Flawed copies of ``points``, one array ``(N, T, P, A)`` a recording.
+
+        Args:
+            points: clean, as simulated.
+            numbers: of the draws ``(N,)``; the flaws of a draw depend on its number and the seed alone.
+            seed: of the study.
+        """
+        out = [np.array(p, float) for p in points]
+        for row, number in enumerate(numbers.astype(int)):
+            rng = np.random.default_rng([seed, 7919, int(number)])
+            for r, recording in enumerate(self.recordings):
+                out[r][row] = self._flawed(out[r][row], recording, rng)
+        return out
+
+    def measured(self) -> list[FloatArray]:
+        """The real thing, in the same form ``(T, P, A)``."""
+        return [r.series.points for r in self.recordings]
+
+    def _flawed(self, clean: FloatArray, recording: Recording, rng: np.random.Generator) -> FloatArray:
+        time, axes = recording.series.time, clean.shape[-1]
+        clock = rng.normal() * self.offsets.clock
+        constant = rng.normal(size=axes) * self.offsets.constant
+        if clock:
+            when = np.clip(time + clock, time[0], time[-1])
+            flat = clean.reshape(len(time), -1)
+            clean = np.stack([np.interp(when, time, c) for c in flat.T], axis=1).reshape(clean.shape)
+        wild = rng.normal(size=clean.shape) * self.noise.sd
+        if self.noise.ar1 > 0:
+            for t in range(1, len(wild)):
+                wild[t] = self.noise.ar1 * wild[t - 1] + np.sqrt(1 - self.noise.ar1**2) * wild[t]
+        flawed = clean + constant + wild
+        if recording.series.correspondence:
+            flawed[~recording.series.valid] = np.nan
+        return np.asarray(flawed)

@@ -1,0 +1,126 @@
+"""Measured minus predicted, in units of the noise, with clock and constant offsets taken out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.arrays import FloatArray
+from ..core.measurement import Recording
+from ..core.series import PointSeries
+from .noise import Noise
+
+#: What a failed rollout counts as, in every residual [noise standard deviations].
+FAILED = 100.0
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Prior standard deviations of what may be off in a recording: clock [s], position [m]."""
+
+    clock: float = 0.0
+    constant: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """One recording against one prediction.
+
+    Args:
+        difference: measured minus predicted ``(T, P, A)`` [unit], offsets taken out; NaN = not seen.
+        white: the same as independent unit-variance numbers under the noise ``(N,)``, and one number
+            for each offset under its prior; its sum of squares is minus twice the log posterior.
+        clock: offset of the measurement's clock that was taken out [s].
+    """
+
+    difference: FloatArray
+    white: FloatArray
+    clock: float = 0.0
+
+    @property
+    def rms(self) -> float:
+        """Root mean square over all seen coordinates [unit]."""
+        return float(np.sqrt(np.nanmean(self.difference**2)))
+
+
+def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets: Offsets) -> Residual:
+    """Compare, after the offsets most probable under their priors are taken out.
+
+    Without correspondence each measured point is held against the nearest predicted one.
+    """
+    measured = recording.series.points
+    model = predicted.points
+    if not recording.series.correspondence:
+        model = _nearest(measured, model)
+    if offsets.clock == 0.0 and offsets.constant == 0.0:
+        difference = measured - model
+        return Residual(difference, _whiten(difference, noise))
+    clock, constant = 0.0, np.zeros(measured.shape[2])
+    time = recording.series.time
+    for _ in range(4):
+        shifted = _shift(model, time, clock)
+        slope = np.gradient(shifted, time, axis=0)
+        clock_step, constant = _solve(measured - shifted, slope, clock, noise, offsets)
+        clock = float(np.clip(clock + clock_step, -4 * offsets.clock, 4 * offsets.clock))
+    difference = measured - _shift(model, time, clock) - constant
+    parts = [_whiten(difference, noise)]
+    if offsets.clock > 0:
+        parts.append(np.array([clock / offsets.clock]))
+    if offsets.constant > 0:
+        parts.append(constant / offsets.constant)
+    return Residual(difference, np.concatenate(parts), clock)
+
+
+def failed(recording: Recording, offsets: Offsets) -> FloatArray:
+    """White residuals that stand for a rollout that failed, of the usual length."""
+    seen = int(np.isfinite(recording.series.points).sum())
+    axes = recording.series.points.shape[2]
+    return np.full(seen + (offsets.clock > 0) + axes * (offsets.constant > 0), FAILED)
+
+
+def _solve(
+    difference: FloatArray, slope: FloatArray, clock: float, noise: Noise, offsets: Offsets
+) -> tuple[float, FloatArray]:
+    """One Gauss-Newton step for the clock and the constant offset, with Gaussian priors of mean zero."""
+    axes = difference.shape[2]
+    seen = np.isfinite(difference)
+    d = np.where(seen, difference, 0.0)
+    s = np.where(seen, slope, 0.0)
+    # correlated noise carries less information than as many independent numbers
+    weight = (1 - noise.ar1) / (1 + noise.ar1) / noise.sd**2
+    normal = np.zeros((1 + axes, 1 + axes))
+    right = np.zeros(1 + axes)
+    normal[0, 0] = weight * np.sum(s * s) + (1 / offsets.clock**2 if offsets.clock > 0 else 1e30)
+    right[0] = weight * np.sum(s * d) - (clock / offsets.clock**2 if offsets.clock > 0 else 0.0)
+    for a in range(axes):
+        normal[0, 1 + a] = normal[1 + a, 0] = weight * np.sum(s[..., a])
+        normal[1 + a, 1 + a] = weight * np.sum(seen[..., a]) + (1 / offsets.constant**2 if offsets.constant > 0 else 1e30)
+        right[1 + a] = weight * np.sum(d[..., a])
+    solved = np.linalg.solve(normal, right)
+    return float(solved[0]), solved[1:]
+
+
+def _shift(points: FloatArray, time: FloatArray, by: float) -> FloatArray:
+    """Points at ``time + by``, linear in between, held at the ends."""
+    if by == 0.0:
+        return points
+    when = np.clip(time + by, time[0], time[-1])
+    right = np.clip(np.searchsorted(time, when, side="right"), 1, len(time) - 1)
+    share = ((when - time[right - 1]) / (time[right] - time[right - 1]))[:, None, None]
+    return np.asarray(points[right - 1] + share * (points[right] - points[right - 1]))
+
+
+def _nearest(measured: FloatArray, model: FloatArray) -> FloatArray:
+    out = np.full_like(measured, np.nan)
+    for t in range(len(measured)):
+        gaps = np.linalg.norm(measured[t, :, None] - model[t, None], axis=-1)
+        out[t] = model[t, np.argmin(np.where(np.isfinite(gaps), gaps, np.inf), axis=1)]
+    return out
+
+
+def _whiten(difference: FloatArray, noise: Noise) -> FloatArray:
+    """AR(1) innovations over the innovation's standard deviation; plain scaling where a frame is missing."""
+    white = difference / noise.sd
+    if noise.ar1 > 0:
+        innovation = (white[1:] - noise.ar1 * white[:-1]) / np.sqrt(1 - noise.ar1**2)
+        white = np.concatenate([white[:1], np.where(np.isfinite(innovation), innovation, white[1:])])
+    return white[np.isfinite(difference)]

@@ -1,0 +1,1 @@
+"""Built-in physical effects and separate plugin distributions."""

@@ -1,0 +1,1 @@
+"""The physical effects that muslin ships."""

@@ -1,0 +1,30 @@
+"""Gravity that does not point down the z axis of the measurement."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.effect import Effect
+from ...core.parameters import Parameter
+
+
+class GravityTilt(Effect):
+    """Gravity turned about the horizontal axes: the frame of the measurement is not level.
+
+    Turned first about x, then about y (rotation matrices R_y R_x).
+    """
+
+    name: ClassVar[str] = "gravity-tilt"
+    acts_on: ClassVar[str] = "gravity"
+    coefficients: ClassVar[tuple[Parameter, ...]] = (
+        Parameter("about_x", "rad", -0.05, 0.05, description="turn about x"),
+        Parameter("about_y", "rad", -0.05, 0.05, description="turn about y"),
+    )
+    symptom: ClassVar[str] = "hangs straight down in the model where the real one leans, moving or not"
+
+    def on_gravity(self, gravity: FloatArray) -> FloatArray:
+        a, b = self.values["about_x"], self.values["about_y"]
+        turn_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+        turn_y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+        return np.asarray(turn_y @ turn_x @ gravity)
