@@ -1,5 +1,6 @@
 """Talking to a person: results on standard output, progress and errors on standard error."""
 
+import math
 import sys
 import time
 from types import TracebackType
@@ -36,7 +37,8 @@ class ProgressView:
         self._stream = stream or sys.stderr
         self._bar: Progress | None = None
         self._task: TaskID | None = None
-        self._last = ("", -QUIET)
+        self._text = ""
+        self._shown = -math.inf
 
     def __enter__(self) -> "ProgressView":
         if self._stream.isatty():
@@ -64,17 +66,14 @@ class ProgressView:
             return
         if self._task is None:
             self._task = self._bar.add_task(text, total=total or None)
-        if text != self._last[0]:
+        if text != self._text:
             self._bar.reset(self._task, total=total or None, description=text)
-            self._last = (text, 0.0)
+            self._text = text
         self._bar.update(self._task, completed=done, total=total or None)
 
     def _line(self, text: str, done: int, total: int) -> None:
-        now, (before, when) = time.monotonic(), self._last
-        ended = total > 0 and done >= total
-        if now - when < QUIET and not (ended and text == before) and text == before:
+        now = time.monotonic()
+        if now - self._shown < QUIET:
             return
-        if text != before and now - when < QUIET and when > 0 and done > 0 and not ended:
-            return
-        self._last = (text, now)
+        self._shown = now
         print(f"{text}: {done} of {total}" if total else text, file=self._stream, flush=True)

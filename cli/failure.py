@@ -48,6 +48,6 @@ def _causes(error: BaseException) -> Iterator[BaseException]:
 
 def _operating_system(error: OSError) -> str:
     place = f" ({error.filename})" if error.filename else ""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return f"the disk is full{place}; free some space and run the same command again"
     return f"{error.strerror or error}{place}"

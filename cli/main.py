@@ -35,7 +35,8 @@ def _options(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and exit.")
     ] = False,
     debug: Annotated[
-        bool, typer.Option("--debug", help="Show the traceback of an error; so does MUSLIN_DEBUG=1. May stand anywhere.")
+        bool,
+        typer.Option("--debug", help="Show the traceback of an error; so does MUSLIN_DEBUG=1. May stand anywhere."),
     ] = False,
 ) -> None:
     """Options of every command."""

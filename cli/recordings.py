@@ -24,7 +24,7 @@ def add_to(app: typer.Typer) -> None:
 
 
 def import_files(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="markers.c3d, points.npz or track.csv.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="markers.c3d, points.npz or track.csv.")],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="RECORDING.zarr", help="The measurement to write, a Zarr store.")
     ],
@@ -36,10 +36,10 @@ def import_files(
         str, typer.Option(metavar="x|y|z", help="Axis of the file that points up; the frame is turned so that it is z.")
     ] = "z",
     start: Annotated[
-        list[float] | None, typer.Option(metavar="SECONDS", help=f"Drop frames before this time [s]. {_EACH}")
+        list[float] | None, typer.Option(metavar="SECONDS", help=f"Drop frames before this time, in s. {_EACH}")
     ] = None,
     stop: Annotated[
-        list[float] | None, typer.Option(metavar="SECONDS", help=f"Drop frames after this time [s]. {_EACH}")
+        list[float] | None, typer.Option(metavar="SECONDS", help=f"Drop frames after this time, in s. {_EACH}")
     ] = None,
     name: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Name of the recording; default the file's. Once a file.")
@@ -52,14 +52,14 @@ def import_files(
         ),
     ] = None,
     load: Annotated[
-        list[float] | None, typer.Option(metavar="KG", help=f"Mass hung on the object [kg]. {_EACH}")
+        list[float] | None, typer.Option(metavar="KG", help=f"Mass hung on the object, in kg. {_EACH}")
     ] = None,
     gripper: Annotated[
         list[Path] | None,
         typer.Option(
             metavar="FILE.csv",
-            help="Gripper poses, for C3D and CSV: time,gripper,x,y,z[,qw,qx,qy,qz], positions in the unit and axes of "
-            f"the points (m beside px). {_EACH}",
+            help="Gripper poses, for C3D and CSV: columns time,gripper,x,y,z and optionally qw,qx,qy,qz; positions in "
+            f"the unit and axes of the points (m beside px). {_EACH}",
         ),
     ] = None,
     correspondence: Annotated[
@@ -78,8 +78,11 @@ def import_files(
     NPZ: time (T,) in s; points (T, P, 2 or 3) in m or px, NaN where not seen; optionally correspondence,
     gripper_pose (T, G, 3 or 7) as x y z and quaternion w x y z, gripper_time, recording, motion, load in kg, unit.
 
-    CSV, one row an observation: time,point,x,y[,z][,recording]; a missing row is a point not seen.
+    CSV, one row an observation: columns time,point,x,y and optionally z, recording; a missing row is a
+    point not seen.
     """
+    if output.exists() and not force:  # said before a long file is read
+        raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
     options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
     recordings: list[Recording] = []
     for k, file in enumerate(files):

@@ -2,16 +2,15 @@
 
 import json
 import math
-import shutil
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..core.errors import InputError, MissingFileError
-from ..core.store import storage_errors
+from ..core.errors import InputError
 from ..core.study import Study
 from .console import ProgressView, next_step, say
+from .output import check_output, write_whole
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
 Workers = Annotated[
@@ -63,13 +62,13 @@ def diagnose(
     candidate explains), cannot-tell (the data could not show it), no-misfit.
     """
     if json_file is not None:  # hours of simulation must not end at a misspelt folder
-        _check_output(json_file, force=True)
+        check_output(json_file, force=True)
     with ProgressView() as progress:
         result = Study.load(study, workers=workers, progress=progress).diagnose()
     say(result.text())
     verdict = result.to_json()
     if json_file is not None:
-        _write(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
+        write_whole(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
     if verdict.get("verdict") == "named" and effects:
@@ -84,7 +83,9 @@ def add(
     study: StudyFile,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", metavar="STUDY2.toml", help="The new study file; default STUDY-with-EFFECT.toml."),
+        typer.Option(
+            "-o", "--output", metavar="STUDY2.toml", help="The new study file; default STUDY-with-EFFECT.toml."
+        ),
     ] = None,
     force: Force = False,
 ) -> None:
@@ -93,7 +94,7 @@ def add(
     target = output or study.with_name(f"{study.stem}-with-{effect}.toml")
     if target.resolve() == study.resolve():
         raise InputError(f"{target} is the study itself; name another file with -o")
-    _check_output(target, force)
+    check_output(target, force)
     made = loaded.add(effect, target)
     say(f"wrote {made.path}: the model of {study} with {effect}")
     next_step(f"muslin fit {made.path}")
@@ -102,46 +103,21 @@ def add(
 def report(
     study: StudyFile,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="REPORT.html", help="The HTML file; default beside the study.")
+        Path | None,
+        typer.Option("-o", "--output", metavar="REPORT.html", help="The HTML file; default beside the study."),
     ] = None,
 ) -> None:
     """Write one self-contained HTML file: fit, errors over time, ranking of effects, before and after."""
     from .report import write_report
 
     if output is not None:
-        _check_output(output, force=True)
+        check_output(output, force=True)
     made = write_report(Study.load(study))
     if output is not None and output.resolve() != made.resolve():
-        partial = output.with_name(f".{output.name}.partial")
-        with storage_errors(output):
-            try:
-                shutil.copyfile(made, partial)
-                partial.replace(output)
-            finally:
-                partial.unlink(missing_ok=True)
+        write_whole(output, made.read_text(encoding="utf-8"))
         made = output
     say(f"wrote {made}")
     say("open it in a browser; it needs no other file")
-
-
-def _check_output(path: Path, force: bool) -> None:
-    if not path.absolute().parent.is_dir():
-        raise MissingFileError(f"there is no folder {path.absolute().parent} for {path.name}; make it first")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; name a file in it")
-    if path.exists() and not force:
-        raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
-
-
-def _write(path: Path, text: str) -> None:
-    """All of it or nothing."""
-    partial = path.with_name(f".{path.name}.partial")
-    with storage_errors(path):
-        try:
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
 
 
 def _plain(value: Any) -> Any:

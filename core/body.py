@@ -47,14 +47,14 @@ class Body:
         t = self.elements
         faces = np.concatenate([t[:, [1, 2, 3]], t[:, [0, 3, 2]], t[:, [0, 1, 3]], t[:, [0, 2, 1]]])
         _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        return faces[first[count == 1]]
+        return np.asarray(faces[first[count == 1]])
 
     @cached_property
     def edges(self) -> IntArray:
         """Unique edges of the elements ``(N, 2)``."""
         k = self.elements.shape[1]
         pairs = np.concatenate([self.elements[:, [i, j]] for i in range(k) for j in range(i + 1, k)])
-        return np.unique(np.sort(pairs, axis=1), axis=0)
+        return np.asarray(np.unique(np.sort(pairs, axis=1), axis=0))
 
     @cached_property
     def measures(self) -> FloatArray:
@@ -68,7 +68,7 @@ class Body:
     def vertex_measures(self) -> FloatArray:
         """The share of area or volume of each vertex ``(V,)``: times density, the lumped mass [kg]."""
         share = np.repeat(self.measures / self.elements.shape[1], self.elements.shape[1])
-        return np.bincount(self.elements.ravel(), share, minlength=len(self.vertices))
+        return np.asarray(np.bincount(self.elements.ravel(), share, minlength=len(self.vertices)), np.float64)
 
     def edge_lengths(self, positions: FloatArray) -> FloatArray:
         """Lengths ``(..., N)`` [m] of the edges at ``positions (..., V, 3)``."""

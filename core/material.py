@@ -1,7 +1,7 @@
 """Materials in SI. The same numbers mean the same object on every backend."""
 
 from dataclasses import dataclass, fields, replace
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeVar, cast
 
 from .errors import InputError
 from .parameters import Parameter
@@ -102,10 +102,13 @@ UNITS = {
 }
 
 
-def with_fields(material: Material, values: dict[str, float]) -> Material:
+M = TypeVar("M", bound=ClothMaterial | SolidMaterial)
+
+
+def with_fields(material: M, values: dict[str, float]) -> M:
     """A copy of ``material`` with some fields replaced; an unknown field is an :class:`InputError`."""
     known = [f.name for f in fields(material)]
     for name in values:
         if name not in known:
             raise InputError(f"a {material.kind} material has no {name!r}; it has {', '.join(known)}")
-    return replace(material, **values)
+    return replace(material, **cast(Any, values))

@@ -28,10 +28,13 @@ class Recording:
     load: float = 0.0
 
     def __post_init__(self) -> None:
-        if not self.name or "/" in self.name:
-            raise InputError(f"a recording needs a name without '/', got {self.name!r}")
-        if self.load < 0:
-            raise InputError(f"recording {self.name!r}: load must not be negative, but is {self.load:g} kg")
+        # the name becomes a folder of the store, whose own files and reserved names must stay free
+        if not self.name.isprintable() or set(self.name) & set("/\\") or self.name.startswith((".", "__")):
+            raise InputError(f"a recording needs a name without slashes that starts with a letter, got {self.name!r}")
+        if not self.name or self.name == "zarr.json":
+            raise InputError(f"a recording cannot be named {self.name!r}; give it another name")
+        if not 0 <= self.load < float("inf"):
+            raise InputError(f"recording {self.name!r}: load must be finite and not negative, but is {self.load:g} kg")
         if not self.motion:
             object.__setattr__(self, "motion", self.name)
 

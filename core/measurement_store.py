@@ -53,8 +53,8 @@ def load_measurement(path: Path) -> Measurement:
     root = open_store(path)
     if root.attrs.get("kind") != "measurement":
         raise InputError(f"{path} is not a measurement but {root.attrs.get('kind')!r}; make one with: muslin import")
-    names = cast(list[str], root.attrs["recordings"])
-    return Measurement(tuple(_recording(subgroup(root, name), name, path) for name in names))
+    names = cast(list[str], root.attrs.get("recordings", []))
+    return Measurement(tuple(_recording(root, name, path) for name in names))
 
 
 def read_hidden(path: Path) -> dict[str, Any] | None:
@@ -63,13 +63,17 @@ def read_hidden(path: Path) -> dict[str, Any] | None:
     return dict(cast(Mapping[str, Any], hidden)) if hidden is not None else None
 
 
-def _recording(group: zarr.Group, name: str, path: Path) -> Recording:
+def _recording(root: zarr.Group, name: str, path: Path) -> Recording:
     try:
+        group = subgroup(root, name)
         unit = cast(PointUnit, str(group["points"].attrs["units"]))
         series = PointSeries(read(group, "time"), read(group, "points"), unit, bool(group.attrs["correspondence"]))
         gripper = None
         if "gripper_pose" in group:
             gripper = Motion(read(group, "gripper_time"), read(group, "gripper_pose"))
         return Recording(name, series, gripper, str(group.attrs["motion"]), float(cast(float, group.attrs["load_kg"])))
-    except (InputError, KeyError) as error:
+    except InputError as error:
         raise InputError(f"{path}, recording {name!r}: {error}") from error
+    except Exception as error:  # what zarr raises on a damaged store depends on what is damaged
+        reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise InputError(f"{path}, recording {name!r} is damaged ({reason}); import it again") from error

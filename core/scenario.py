@@ -80,7 +80,7 @@ class Scenario:
         """Vertices ``(V, 3)`` [m] at the start; ``scale`` stretches about the first grasp."""
         about = self.body.vertices[self.grasps[0]].mean(axis=0) if self.grasps else self.body.vertices.mean(axis=0)
         pose = self.motion.at(self.times[:1])[0, 0]
-        return rotate(pose[3:], self.body.scaled(scale, about).vertices) + pose[:3]
+        return np.asarray(rotate(pose[3:], self.body.scaled(scale, about).vertices) + pose[:3])
 
     def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
         body = replace(self.body, vertices=self.world_vertices(scale))

@@ -66,8 +66,9 @@ def open_store(path: Path, mode: str = "r") -> zarr.Group:
         raise MissingFileError(f"there is no store at {path}")
     try:
         root = zarr.open_group(path, mode="r+" if mode == "r+" else "r", zarr_format=3)
-    except (FileNotFoundError, ValueError, KeyError) as error:
-        raise InputError(f"{path} is not a Zarr store that muslin wrote: {error}") from error
+    except Exception as error:  # zarr fails in many ways on a folder that is none of its stores, or is damaged
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise InputError(f"{path} is not a Zarr store that muslin wrote: {reason}") from error
     found = root.attrs.get("muslin_format")
     if found != FORMAT:
         raise InputError(f"{path} has format {found!r}, but this muslin reads format {FORMAT}")

@@ -1,5 +1,6 @@
 """Measurements with a hidden effect: known truth to practise and to test on."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -20,9 +21,9 @@ from .simulator import Simulator
 #: Vertices of the 9 x 9 cloth that carry a marker: every second one of every second row.
 MARKERS = [r * 9 + c for r in range(0, 9, 2) for c in range(0, 9, 2)]
 #: Motions; the last is held out: a fling higher, wider and slower than the one that is fitted.
-MOTIONS = {
-    "fling": lambda: fling_motion(),
-    "swing": lambda: swing_motion(),
+MOTIONS: dict[str, Callable[[], Motion]] = {
+    "fling": fling_motion,
+    "swing": swing_motion,
     "fling-wide": lambda: fling_motion(reach=0.30, height=0.10, duration=0.65),
 }
 HELD_OUT = "fling-wide"
@@ -59,7 +60,7 @@ def hidden_effect(
     material = ClothMaterial()
     # the middle of the prior in the logarithm, so that a posterior has room on both sides
     drawn = {p.name: float(p.low * (p.high / p.low) ** rng.uniform(0.25, 0.75)) for p in DEFAULT_PRIORS["cloth"]}
-    material = with_fields(material, drawn)  # type: ignore[assignment]
+    material = with_fields(material, drawn)
     active: list[Effect] = []
     coefficients: dict[str, float] = {}
     if effect is not None:

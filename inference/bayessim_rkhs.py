@@ -1,5 +1,6 @@
 """BayesSim-RKHS: a mixture density network on kernel mean embeddings of the points of every frame."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -10,15 +11,21 @@ from torch import Tensor
 from ..core.arrays import FloatArray
 from ..core.errors import InputError, StepMissingError
 from ..core.estimator import PosteriorEstimator
+from .density import mixture_log_prob
 from .encoder import Encoder
-from .mixture import MixturePosterior, to_latent
+from .mixture import MixturePosterior
 from .networks import SummaryNetwork, TrajectoryNetwork
 from .rkhs import RKHSEmbedding
 from .settings import settings
-from .summaries import Summaries
+from .summaries import Summaries, probit
 from .training import importance_weights, isolated, train
 
 _MIN_DRAWS = 10
+# Part of the mass in a copy of the mixture this much wider, so that the few draws in its tail do not widen it all.
+_TAILS = (0.001, 0.01, 0.03, 0.06, 0.1, 0.2)
+_TAIL_WIDTH = 3.0
+# Factors on all standard deviations, of which the one that suits the left-out draws best is taken.
+_WIDENINGS = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0)
 
 
 class BayesSimRKHS(PosteriorEstimator):
@@ -38,7 +45,8 @@ class BayesSimRKHS(PosteriorEstimator):
       summarised by principal components and kernel ridge regression (leave-one-out, :mod:`~.ridge`); where points
       correspond, so are their displacements;
     - several small networks, each stopped early on draws that it leaves out, turn the summaries into mixtures,
-      which are averaged; one scale of all covariances is set on the left-out draws.
+      which are averaged; one scale of all standard deviations, and the mass in a wider copy of the mixture, are set
+      on the left-out draws.
 
     Training takes seconds for hundreds of draws. A measurement far outside the range of the draws is pulled to its
     border: check a posterior against the measurement before trusting it.
@@ -61,6 +69,8 @@ class BayesSimRKHS(PosteriorEstimator):
         self.correspondence = correspondence
         self.settings = settings(preset, options)
         self._encoder: Encoder | None = None
+        self._summaries: Summaries | None = None
+        self._members: list[SummaryNetwork] = []
 
     def fit(
         self, theta: FloatArray, x: list[FloatArray], *, log_weights: FloatArray | None = None, seed: int = 0
@@ -93,16 +103,16 @@ class BayesSimRKHS(PosteriorEstimator):
     ) -> None:
         s = self.settings
         self._encoder, self._summaries, self._members = None, None, []
-        # Draws on a face of the cube would lie at infinity; 1e-4 is far below what hundreds of draws resolve.
-        z = torch.tensor(to_latent(theta, 1e-4))
+        unit = torch.tensor(theta)
+        z = probit(unit)
         w = torch.tensor(weights)
         encoder = Encoder(x, flags, s.principal, generator)
         points, seen = encoder.points(x)
         network = self._train_trajectories(encoder, points, seen, z, w, generator)
         self._network = network
         if s.summaries:
-            rows = encoder.embedded(network.embedding, points, seen, 0)
-            self._summaries = Summaries(rows, z, w, s.principal, s.shown)
+            blocks = encoder.blocks(network.embedding, points, seen)
+            self._summaries = Summaries(blocks, unit, w, s.principal, s.shown)
             self._train_members(self._summaries, z, w, generator)
         self._encoder = encoder
 
@@ -136,14 +146,27 @@ class BayesSimRKHS(PosteriorEstimator):
         target, weights, scale = z.float(), w.float(), summaries.residual.float()
         members = max(2, s.members)
         fold = torch.randperm(len(z), generator=generator) % members
+        left_out = torch.zeros(len(_TAILS), len(_WIDENINGS))
         for k in range(members):
             network = SummaryNetwork(features.shape[1], z.shape[1], s.summary_hidden, s.components, scale)
             train(
                 network, [features, guess], target, weights, fold == k, generator,
-                learning_rate=s.summary_learning_rate, weight_decay=s.summary_decay, batch=s.batch,
+                learning_rate=s.summary_learning_rate, weight_decay=s.summary_decay, batch=s.summary_batch,
                 max_epochs=s.summary_epochs, patience=s.summary_patience,
             )  # fmt: skip
             self._members.append(network)
+            rows = torch.nonzero(fold == k).flatten()
+            with torch.no_grad():
+                logits, means, factors = network(features[rows], guess[rows])
+                narrow, wide = (
+                    torch.stack([mixture_log_prob(target[rows], logits, means, factors / (f * c)) for c in _WIDENINGS])
+                    for f in (1.0, _TAIL_WIDTH)
+                )
+                for i, tail in enumerate(_TAILS):
+                    log_p = torch.logaddexp(narrow + math.log(1.0 - tail), wide + math.log(tail))
+                    left_out[i] += log_p @ weights[rows]
+        best = int(left_out.argmax())
+        self._tail, self._widening = _TAILS[best // len(_WIDENINGS)], _WIDENINGS[best % len(_WIDENINGS)]
 
     def posterior(self, x: list[FloatArray]) -> MixturePosterior:
         """The posterior given one measurement.
@@ -166,15 +189,21 @@ class BayesSimRKHS(PosteriorEstimator):
                 s = self.settings
                 inputs, masks = self._encoder.coded(points, seen, s.frames, s.points)
                 return _mixture(self._network(*inputs, *masks))
-            rows = self._encoder.embedded(self._network.embedding, points, seen, 0)
-            features, guess = self._summaries(rows)
-            return MixturePosterior.average([_mixture(m(features.float(), guess.float())) for m in self._members])
+            features, guess = self._summaries(self._encoder.blocks(self._network.embedding, points, seen))
+            outputs = [m(features.float(), guess.float()) for m in self._members]
+            core = MixturePosterior.average([_mixture(o, self._widening) for o in outputs])
+            wide = _TAIL_WIDTH * core.cholesky
+            return MixturePosterior(
+                np.concatenate([(1.0 - self._tail) * core.weights, self._tail * core.weights]),
+                np.concatenate([core.means, core.means]),
+                np.concatenate([core.cholesky, wide]),
+            )
 
 
-def _mixture(outputs: tuple[Tensor, Tensor, Tensor]) -> MixturePosterior:
-    """The first row of a network's mixtures as a posterior."""
+def _mixture(outputs: tuple[Tensor, Tensor, Tensor], widening: float = 1.0) -> MixturePosterior:
+    """The first row of a network's mixtures as a posterior, all its standard deviations scaled."""
     log_weights, means, factors = (t[0].double() for t in outputs)
-    inverse = torch.linalg.inv(factors)
+    inverse = widening * torch.linalg.inv(factors)
     # N(m, (P^T P)^-1): the covariance is P^-1 P^-T, and P^-1 is lower triangular like P.
     return MixturePosterior(log_weights.exp().numpy(), means.numpy(), inverse.numpy())
 
@@ -208,7 +237,7 @@ def _checked(
             raise InputError(f"recordings must share their axes, but have {[b.shape[3] for b in x]}")
         if np.isinf(a).any():
             raise InputError(f"recording {r} holds an infinite coordinate; leave failed draws out")
-        empty = np.flatnonzero(~np.isfinite(a).all(axis=3).any(axis=(1, 2)))
+        empty = np.flatnonzero(~np.isfinite(a).all(axis=3).reshape(draws, -1).any(axis=1))
         if len(empty):
             raise InputError(
                 f"in recording {r}, {len(empty)} of {draws} draws have no point that was seen "

@@ -14,7 +14,7 @@ class PrincipalComponents:
     mean: its scores are their conditional expectation under probabilistic PCA (Tipping and Bishop 1999).
 
     Args:
-        rows: ``(N, F)`` float64, centred; 0 where not seen.
+        rows: ``(N, F)`` float64, centred; 0 where not seen (here and in all methods).
         seen: ``(N, F)`` or None when all entries are seen.
         count: at most this many directions.
     """
@@ -25,7 +25,7 @@ class PrincipalComponents:
         self.basis, self.variance, self.noise = _decompose(part, count)
         if mask is not None and not bool(mask.all()):
             # Missing entries start at the mean; a few rounds of filling them in from the basis settle it.
-            for _ in range(3):
+            for _ in range(2):
                 filled = torch.where(mask, part, self.scores(part, mask) @ self.basis.T)
                 self.basis, self.variance, self.noise = _decompose(filled, count)
 
@@ -34,10 +34,12 @@ class PrincipalComponents:
         scores = rows @ self.basis
         if seen is None:
             return scores
+        identity = torch.eye(scores.shape[1], dtype=scores.dtype)
         for i in torch.nonzero(~seen.all(dim=1)).flatten().tolist():
-            basis = self.basis[seen[i]]
-            system = basis.T @ basis + torch.diag(self.noise / self.variance)
-            scores[i] = torch.linalg.solve(system, basis.T @ rows[i, seen[i]])
+            # The basis is orthonormal, so the part that was seen is one less the part that was not.
+            lost = self.basis[~seen[i]]
+            system = identity - lost.T @ lost + torch.diag(self.noise / self.variance)
+            scores[i] = torch.linalg.solve(system, scores[i])
         return scores
 
     def complete(self, rows: Tensor, seen: Tensor) -> Tensor:

@@ -1,7 +1,7 @@
 """Simulated draws on disk: one chunk a draw, whole or absent, so that a killed fit goes on."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import zarr
@@ -77,7 +77,8 @@ class DrawStore:
         self.status[draw] = FAILED if reasons else WHOLE
 
     def _failures(self) -> dict[str, str]:
-        return {str(k): str(v) for k, v in dict(self.group.attrs.get("failures", {})).items()}  # type: ignore[call-overload]
+        stored = cast(Mapping[str, str], self.group.attrs.get("failures", {}))
+        return dict(stored)
 
     def failures(self) -> list[str]:
         """Reasons of the draws that failed."""

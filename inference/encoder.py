@@ -94,6 +94,12 @@ class Encoder:
                 blocks.append(torch.cat(rows).double())
         return torch.cat(blocks, dim=1)
 
+    def blocks(self, layer: RKHSEmbedding, points: list[Tensor], seen: list[Tensor]) -> list[Tensor]:
+        """Rows for summaries: embedded frames, and the coordinates themselves of points that correspond."""
+        rows = [self.embedded(layer, points, seen, 0)]
+        known = [z.flatten(1) for z, s in zip(points, self.scalers, strict=True) if s.points is not None]
+        return [*rows, torch.cat(known, dim=1)] if known else rows
+
 
 def _centred(rows: Tensor, mean: Tensor, seen: Tensor) -> Tensor:
     """Rows less their mean, zero where not seen."""

@@ -21,11 +21,9 @@ from .draws import ABSENT, DrawStore
 from .noise import Noise, estimate_noise
 from .observe import Observer
 from .polish import Objective, polish
+from .proposals import log_weights, propose
 from .residuals import Offsets, residual
 
-#: Share of every later round's proposal that is still the prior. It bounds the importance weights
-#: p / p~ by the inverse of the prior's share of all draws.
-DEFENSIVE = 0.2
 #: Posterior mass within 2 % of a bound above which the prior box looks too small.
 AT_BOUND = 0.3
 SAMPLES = 2000
@@ -91,7 +89,7 @@ def fit(study: Study) -> FitResult:
     density: list[Posterior] = []
     with study.pool(problem) as pool:
         for k in range(rounds):
-            proposal = _propose(density, per_round, len(problem.space), np.random.default_rng([config.study.seed, k]))
+            proposal = propose(density, per_round, len(problem.space), np.random.default_rng([config.study.seed, k]))
             first = k * per_round
             missing = [i for i in range(per_round) if store.status[first + i] == ABSENT]
             tasks = [
@@ -102,9 +100,7 @@ def fit(study: Study) -> FitResult:
             outcomes = pool.map(tasks)
             for done, i in enumerate(missing):
                 store.write(first + i, proposal[i], {r: next(outcomes) for r in problem.fit_on})
-                study.progress(
-                    f"round {k + 1} of {rounds}: simulating", per_round - len(missing) + done + 1, per_round
-                )
+                study.progress(f"round {k + 1} of {rounds}: simulating", per_round - len(missing) + done + 1, per_round)
             theta, points, numbers = store.read(first + per_round)
             if len(theta) < max(10, 0.1 * (first + per_round)):
                 raise MuslinError(_too_many_failed(store, first + per_round))
@@ -125,7 +121,9 @@ def fit(study: Study) -> FitResult:
         group = store.group
         put(group, "posterior_samples", units.from_unit(samples), ["sample", "parameter"])
         put(group, "posterior_log_prob", density[-1].log_prob(samples), ["sample"], "log density on the unit cube")
-        put(group, "posterior_file", _file_bytes(density[-1]), ["byte"], "1", "the posterior, as its estimator saves it")
+        put(
+            group, "posterior_file", _file_bytes(density[-1]), ["byte"], "1", "the posterior, as its estimator saves it"
+        )
         put(group, "estimate", estimate, ["parameter"])
         put(group, "estimate_sd", sd, ["parameter"])
         put(group, "estimate_unit", best.unit, ["parameter"], "unit cube")
@@ -177,27 +175,6 @@ def physical_sd(space: ParameterSpace, unit: FloatArray, covariance: FloatArray)
     return np.asarray(np.abs(slope) * np.sqrt(np.diag(covariance)))
 
 
-def _propose(density: list[Posterior], count: int, dimension: int, rng: np.random.Generator) -> FloatArray:
-    """Round 0 from the prior; later ones from the latest posterior, with a share of the prior."""
-    prior = rng.random((count, dimension))
-    if not density:
-        return prior
-    take = rng.random(count) >= DEFENSIVE
-    return np.asarray(np.where(take[:, None], density[-1].sample(count, rng), prior))
-
-
-def _log_weights(theta: FloatArray, proposals: list[Posterior]) -> FloatArray:
-    """log p / p~, with p~ the mixture of the proposals of all rounds (balance heuristic).
-
-    p is one on the unit cube. Every proposal is a density on the cube, so nothing leaves the positive
-    definite cone as it does when Gaussians are divided.
-    """
-    share = np.ones(len(theta))  # round 0: the prior
-    for proposal in proposals:
-        share += DEFENSIVE + (1 - DEFENSIVE) * np.exp(proposal.log_prob(theta))
-    return np.asarray(-np.log(share / (1 + len(proposals))))
-
-
 def _train(
     study: Study,
     observer: Observer,
@@ -216,7 +193,7 @@ def _train(
     except TypeError as error:
         raise InputError(f"[estimator] {table.name!r} does not take these options: {error}") from error
     flawed = observer.observe(points, numbers, study.config.study.seed)
-    weights = _log_weights(theta, proposals) if proposals else None
+    weights = log_weights(theta, proposals) if proposals else None
     estimator.fit(theta, flawed, log_weights=weights, seed=study.config.study.seed + round_number)
     return estimator.posterior(observer.measured())
 
@@ -231,7 +208,7 @@ def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:
             series = PointSeries(recording.series.time, p, recording.series.unit, recording.series.correspondence)
             white = residual(recording, series, noise, offsets_of(study)).white
             total[k] += float(white @ white)
-    return theta[int(np.argmin(total))]
+    return np.asarray(theta[int(np.argmin(total))])
 
 
 def _too_many_failed(store: DrawStore, count: int) -> str:

@@ -76,7 +76,8 @@ class MixturePosterior(Posterior):
         noise = rng.standard_normal((count, self.dim))
         z = self.means[which] + np.einsum("nij,nj->ni", self.cholesky[which], noise)
         # Phi rounds to 0 or 1 far out; the nearest numbers inside keep every draw in the open cube.
-        return np.clip(np.asarray(ndtr(z), float), np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
+        unit = np.clip(ndtr(z), np.finfo(float).tiny, 1.0 - np.finfo(float).epsneg)
+        return np.asarray(unit, float)
 
     def log_prob(self, unit: FloatArray) -> FloatArray:
         u = np.asarray(unit, float)

@@ -7,6 +7,7 @@ from torch import Tensor, nn
 
 from .density import MixtureHead, mixture_log_prob
 from .rkhs import RKHSEmbedding
+from .training import DensityNetwork
 
 Mixture = tuple[Tensor, Tensor, Tensor]
 
@@ -19,7 +20,7 @@ def _layers(inputs: int, hidden: Sequence[int], activation: type[nn.Module]) -> 
     return nn.Sequential(*layers), inputs
 
 
-class TrajectoryNetwork(nn.Module):
+class TrajectoryNetwork(DensityNetwork):
     """The paper's network: RKHS layer per frame, fully connected layers, full-covariance mixture density.
 
     Ours: the frames' embeddings are standardised by statistics of the training draws before the first layer (fixed
@@ -47,8 +48,10 @@ class TrajectoryNetwork(nn.Module):
         super().__init__()
         self.embedding = embedding
         with torch.no_grad():
-            rows = [self._embed([p[i : i + 64] for p in points], [s[i : i + 64] for s in seen])
-                    for i in range(0, len(points[0]), 64)]
+            rows = [
+                self._embed([p[i : i + 64] for p in points], [s[i : i + 64] for s in seen])
+                for i in range(0, len(points[0]), 64)
+            ]
         flat = torch.cat(rows)
         self.shift: Tensor
         self.spread: Tensor
@@ -70,11 +73,10 @@ class TrajectoryNetwork(nn.Module):
         return self.head(features, features.new_zeros(len(flat), self.head.dim))  # type: ignore[no-any-return]
 
     def log_prob(self, inputs: Sequence[Tensor], z: Tensor) -> Tensor:
-        """``(B,)`` log density of targets ``(B, D)``."""
         return mixture_log_prob(z, *self(*inputs))
 
 
-class SummaryNetwork(nn.Module):
+class SummaryNetwork(DensityNetwork):
     """Summaries to a mixture: it corrects a first guess of the mean and learns the shape around it.
 
     Args:
@@ -91,6 +93,5 @@ class SummaryNetwork(nn.Module):
         return self.head(self.layers(features), base)  # type: ignore[no-any-return]
 
     def log_prob(self, inputs: Sequence[Tensor], z: Tensor) -> Tensor:
-        """``(B,)`` log density of targets ``(B, D)``."""
         features, base = inputs
         return mixture_log_prob(z, *self(features, base))

@@ -32,6 +32,11 @@ class Noise:
     unit: str
     relative_error: float
 
+    @property
+    def information(self) -> float:
+        """How many independent numbers one number of an AR(1) sequence is worth, for its mean."""
+        return (1 - self.ar1) / (1 + self.ar1)
+
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
 
@@ -78,7 +83,7 @@ def _fourth_difference(recording: Recording) -> FloatArray:
     if not recording.series.correspondence:
         return np.zeros(0)
     d = np.diff(recording.series.points, n=4, axis=0) / np.sqrt(70.0)
-    return d[np.isfinite(d)]
+    return np.asarray(d[np.isfinite(d)])
 
 
 def _difference(a: Recording, b: Recording) -> FloatArray:

@@ -31,7 +31,7 @@ class PointScaler:
     @classmethod
     def fit(cls, x: FloatArray, correspondence: bool) -> "PointScaler":
         """Statistics of ``(N, T, P, A)`` draws, NaN = not seen."""
-        seen = np.isfinite(x).all(axis=3)
+        seen = np.asarray(np.isfinite(x).all(axis=3))
         axes = (0, 2)
         count = seen.sum(axis=axes, keepdims=True)[..., None]
         total = np.where(seen[..., None], x, 0.0).sum(axis=axes, keepdims=True)

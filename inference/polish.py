@@ -26,12 +26,19 @@ class Polished:
         covariance: of ``unit``, from the curvature at the best fit (Laplace), ``(D, D)``.
         jacobian: of the white residuals ``(N, D)``.
         white: white residuals at the best fit ``(N,)``.
+        information: of one residual, below 1 where noise is correlated in time.
     """
 
     unit: FloatArray
     covariance: FloatArray
     jacobian: FloatArray
     white: FloatArray
+    information: float
+
+    @property
+    def count(self) -> float:
+        """Independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left."""
+        return self.information * len(self.white)
 
     @property
     def rss(self) -> float:
@@ -111,4 +118,6 @@ def polish(objective: Objective, start: FloatArray, evaluations: int = 12) -> Po
     jacobian, white = np.asarray(result.jac, float), np.asarray(result.fun, float)
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
     information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
-    return Polished(np.asarray(result.x, float), np.linalg.inv(information), jacobian, white)
+    return Polished(
+        np.asarray(result.x, float), np.linalg.inv(information), jacobian, white, objective.noise.information
+    )

@@ -27,8 +27,8 @@ class Residual:
 
     Args:
         difference: measured minus predicted ``(T, P, A)`` [unit], offsets taken out; NaN = not seen.
-        white: the same as independent unit-variance numbers under the noise ``(N,)``, and one number
-            for each offset under its prior; its sum of squares is minus twice the log posterior.
+        white: the same in units of the noise ``(N,)``, see :func:`_weighted`, and one number for each
+            offset under its prior; its sum of squares is minus twice the log posterior.
         clock: offset of the measurement's clock that was taken out [s].
     """
 
@@ -53,7 +53,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         model = _nearest(measured, model)
     if offsets.clock == 0.0 and offsets.constant == 0.0:
         difference = measured - model
-        return Residual(difference, _whiten(difference, noise))
+        return Residual(difference, _weighted(difference, noise))
     clock, constant = 0.0, np.zeros(measured.shape[2])
     time = recording.series.time
     for _ in range(4):
@@ -62,7 +62,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         clock_step, constant = _solve(measured - shifted, slope, clock, noise, offsets)
         clock = float(np.clip(clock + clock_step, -4 * offsets.clock, 4 * offsets.clock))
     difference = measured - _shift(model, time, clock) - constant
-    parts = [_whiten(difference, noise)]
+    parts = [_weighted(difference, noise)]
     if offsets.clock > 0:
         parts.append(np.array([clock / offsets.clock]))
     if offsets.constant > 0:
@@ -85,15 +85,16 @@ def _solve(
     seen = np.isfinite(difference)
     d = np.where(seen, difference, 0.0)
     s = np.where(seen, slope, 0.0)
-    # correlated noise carries less information than as many independent numbers
-    weight = (1 - noise.ar1) / (1 + noise.ar1) / noise.sd**2
+    weight = noise.information / noise.sd**2
     normal = np.zeros((1 + axes, 1 + axes))
     right = np.zeros(1 + axes)
     normal[0, 0] = weight * np.sum(s * s) + (1 / offsets.clock**2 if offsets.clock > 0 else 1e30)
     right[0] = weight * np.sum(s * d) - (clock / offsets.clock**2 if offsets.clock > 0 else 0.0)
     for a in range(axes):
         normal[0, 1 + a] = normal[1 + a, 0] = weight * np.sum(s[..., a])
-        normal[1 + a, 1 + a] = weight * np.sum(seen[..., a]) + (1 / offsets.constant**2 if offsets.constant > 0 else 1e30)
+        normal[1 + a, 1 + a] = weight * np.sum(seen[..., a]) + (
+            1 / offsets.constant**2 if offsets.constant > 0 else 1e30
+        )
         right[1 + a] = weight * np.sum(d[..., a])
     solved = np.linalg.solve(normal, right)
     return float(solved[0]), solved[1:]
@@ -117,10 +118,11 @@ def _nearest(measured: FloatArray, model: FloatArray) -> FloatArray:
     return out
 
 
-def _whiten(difference: FloatArray, noise: Noise) -> FloatArray:
-    """AR(1) innovations over the innovation's standard deviation; plain scaling where a frame is missing."""
-    white = difference / noise.sd
-    if noise.ar1 > 0:
-        innovation = (white[1:] - noise.ar1 * white[:-1]) / np.sqrt(1 - noise.ar1**2)
-        white = np.concatenate([white[:1], np.where(np.isfinite(innovation), innovation, white[1:])])
-    return white[np.isfinite(difference)]
+def _weighted(difference: FloatArray, noise: Noise) -> FloatArray:
+    """Seen differences over the noise, scaled so that their squares add up as fewer, independent ones would.
+
+    Filtering them to innovations instead would weigh fast errors above slow ones, and a stiff model
+    that hardly moves would beat the right one that swings slightly out of phase.
+    """
+    seen = difference[np.isfinite(difference)]
+    return np.asarray(seen * (np.sqrt(noise.information) / noise.sd))

@@ -23,17 +23,18 @@ class Settings:
         summaries: whether the posterior comes from the second stage, on summaries of all frames.
         principal: principal components kept of each kind of summary.
         shown: of these, how many the second stage's networks read beside the regression.
-        summary_hidden, summary_learning_rate, summary_decay, summary_epochs, summary_patience: of the second stage.
+        summary_hidden, summary_learning_rate, summary_decay, summary_epochs, summary_patience, summary_batch: of
+            the second stage.
         members: networks of the second stage, each leaving another part of the draws out.
         threads: torch threads during training.
     """
 
-    features: int = 32
+    features: int = 64
     bandwidth: float = 1.0
     components: int = 4
     hidden: tuple[int, ...] = (64,)
     learning_rate: float = 3e-3
-    max_epochs: int = 40
+    max_epochs: int = 25
     patience: int = 8
     batch: int = 64
     frames: int = 8
@@ -45,7 +46,8 @@ class Settings:
     summary_learning_rate: float = 3e-3
     summary_decay: float = 1e-4
     summary_epochs: int = 200
-    summary_patience: int = 20
+    summary_patience: int = 15
+    summary_batch: int = 128
     members: int = 5
     threads: int = 1
 
@@ -87,7 +89,12 @@ def settings(preset: str, options: dict[str, Any]) -> Settings:
                 raise InputError(f"bayessim-rkhs: {name} must be a list of widths above zero, not {list(value)}")
         elif not isinstance(default, bool):
             zero_allowed = name in ("patience", "frames", "points", "summary_decay")
-            if isinstance(value, bool) or not isinstance(value, int | float) or value < 0 or not (value or zero_allowed):
+            if (
+                isinstance(value, bool)
+                or not isinstance(value, int | float)
+                or value < 0
+                or not (value or zero_allowed)
+            ):
                 low = "zero or more" if zero_allowed else "above zero"
                 raise InputError(f"bayessim-rkhs: {name} must be a number {low}, not {value!r}")
             value = type(default)(value)

@@ -1,9 +1,9 @@
 """Training: weights, early stopping, and a run that leaves no trace outside and repeats to the bit."""
 
 import copy
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -13,10 +13,12 @@ from ..core.arrays import FloatArray
 from ..core.errors import InputError
 
 
-class DensityNetwork(Protocol):
-    """What :func:`train` needs of a network, beside being a module."""
+class DensityNetwork(torch.nn.Module, ABC):
+    """A network that gives the density of its targets."""
 
-    def log_prob(self, inputs: Sequence[Tensor], z: Tensor) -> Tensor: ...
+    @abstractmethod
+    def log_prob(self, inputs: Sequence[Tensor], z: Tensor) -> Tensor:
+        """``(B,)`` natural log density of targets ``z (B, D)``, given tensors whose first axis is B."""
 
 
 @contextmanager
@@ -27,7 +29,7 @@ def isolated(seed: int, threads: int) -> Iterator[torch.Generator]:
     """
     before = torch.get_num_threads()
     with torch.random.fork_rng(devices=[]), torch.enable_grad():
-        torch.random.default_generator.manual_seed(seed)
+        torch.default_generator.manual_seed(seed)
         torch.set_num_threads(threads)
         try:
             yield torch.Generator().manual_seed(seed)
@@ -59,7 +61,7 @@ def importance_weights(log_weights: FloatArray | None, draws: int) -> FloatArray
 
 
 def train(
-    network: torch.nn.Module,
+    network: DensityNetwork,
     inputs: Sequence[Tensor],
     z: Tensor,
     weights: Tensor,
@@ -75,7 +77,7 @@ def train(
     """Maximise the weighted log density by Adam; keep the state that was best on the held-out draws.
 
     Args:
-        network: a module with ``log_prob`` (:class:`DensityNetwork`).
+        network: trained in place.
         inputs: tensors whose first axis is the draws.
         z: ``(N, D)`` targets.
         weights: ``(N,)``.
@@ -99,10 +101,11 @@ def train(
     state, waited = copy.deepcopy(network.state_dict()), 0
     for _ in range(max_epochs):
         order = kept[torch.randperm(len(kept), generator=generator)]
-        for rows in order.split(batch):
+        for start in range(0, len(order), batch):
+            rows = order[start : start + batch]
             loss = -(weights[rows] * network.log_prob([t[rows] for t in inputs], z[rows])).mean()
             optimiser.zero_grad()
-            loss.backward()
+            torch.autograd.backward(loss)
             torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
             optimiser.step()
         if not len(test):

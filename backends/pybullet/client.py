@@ -14,7 +14,9 @@ from .library import bullet
 
 _DEFORMABLE_WORLD = 1
 _SOFT_BODY_LOADED = 99
-#: Distance at which Bullet makes a vertex touch [m]. The table is lowered by it, so that vertices rest at the height asked for.
+_NEVER_SLEEP = 2
+#: Distance at which Bullet makes a vertex touch [m]. The table is lowered by it, so that vertices rest at
+#: the height asked for.
 MARGIN = 0.002
 _TABLE_HALF_EXTENTS = np.array([10.0, 10.0, 1.0])
 
@@ -110,6 +112,9 @@ class Client:
         if api.b3GetStatusType(status) != _SOFT_BODY_LOADED:
             raise RolloutFailed("Bullet refused to load the mesh")
         self._soft, self._count = api.b3GetStatusBodyIndex(status), count
+        command = api.b3InitChangeDynamicsInfo(self._handle)
+        api.b3ChangeDynamicsInfoSetActivationState(command, self._soft, _NEVER_SLEEP)
+        self._submit(command)
         found = len(self.positions())
         if found != count:
             raise RolloutFailed(f"Bullet made {found} vertices from a mesh of {count}; some coincide or are unused")

@@ -1,7 +1,5 @@
 """Cloth: Bullet moves and collides the vertices, the forces inside the sheet are computed here."""
 
-from typing import ClassVar
-
 from ...core.arrays import FloatArray
 from ...core.material import ClothMaterial
 from ...core.scene import Scene
@@ -21,14 +19,16 @@ class ClothWorld(SoftWorld):
     bending springs have no linear bending rigidity. See :class:`SoftWorld` for what Bullet does do.
     """
 
-    own_elasticity: ClassVar[bool] = True
-
     def __init__(self, scene: Scene, material: ClothMaterial, time_step: float, most_substeps: int) -> None:
         elements = Elements(scene.body, plane_stress(material.stretch_stiffness, material.poisson_ratio))
-        bending = material.bending_rigidity * bending_matrix(scene.body)
+        bending = material.bending_rigidity * bending_matrix(scene.body, scene.held)
         super().__init__(scene, time_step, most_substeps, Elasticity(elements, bending), lame=None)
 
-    def _advance(self, positions: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
-        self._client.set_velocities(velocities)
-        self._client.step()
-        return self._client.positions(), self._client.velocities()
+    def _advance(
+        self, positions: FloatArray, velocities: FloatArray, push: FloatArray, pull: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        matrix = self._elasticity.strain_matrix(positions)
+        velocities = self._kicked(velocities, push + self._elasticity.forces(matrix, positions), pull)
+        if self._beta > 0:
+            velocities = self._elasticity.damped(matrix, velocities, self.masses, self._free, self._beta * self._dt)
+        return self._bullet(velocities)

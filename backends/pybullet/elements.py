@@ -51,14 +51,15 @@ class Elements:
     def strain_matrix(self, positions: FloatArray) -> FloatArray:
         """B at ``positions (V, 3)`` [m]."""
         deformation = np.matmul(self._gradients, positions[self._elements])
-        return np.matmul(self._spread, deformation).reshape(len(self._elements), -1, self._slots.shape[1])
+        return np.asarray(np.matmul(self._spread, deformation)).reshape(len(self._elements), -1, self._slots.shape[1])
 
     def _strain(self, matrix: FloatArray, motion: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("esk,ek->es", matrix, motion.ravel().take(self._slots)))
 
     def _pull(self, matrix: FloatArray, strain: FloatArray) -> FloatArray:
         local = np.einsum("esk,es->ek", matrix, strain)
-        return np.bincount(self._flat_slots, local.ravel(), minlength=3 * self._count).reshape(-1, 3)
+        total = np.bincount(self._flat_slots, local.ravel(), minlength=3 * self._count)
+        return np.asarray(total, dtype=np.float64).reshape(-1, 3)
 
     def forces(self, matrix: FloatArray, positions: FloatArray) -> FloatArray:
         """Elastic nodal forces ``(V, 3)`` [N] at ``positions (V, 3)`` [m], of which ``matrix`` is the strain matrix."""

@@ -32,6 +32,7 @@ _FUNCTIONS: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
     ("b3CreateMultiBodyBase", _INT, (_ADDRESS, _REAL, _INT, _INT, _ADDRESS, _ADDRESS, _ADDRESS, _ADDRESS)),
     ("b3InitChangeDynamicsInfo", _ADDRESS, (_ADDRESS,)),
     ("b3ChangeDynamicsInfoSetLateralFriction", _INT, (_ADDRESS, _INT, _INT, _REAL)),
+    ("b3ChangeDynamicsInfoSetActivationState", _INT, (_ADDRESS, _INT, _INT)),
     ("b3LoadSoftBodyCommandInit", _ADDRESS, (_ADDRESS, _TEXT)),
     ("b3LoadSoftBodySetMass", _INT, (_ADDRESS, _REAL)),
     ("b3LoadSoftBodySetCollisionMargin", _INT, (_ADDRESS, _REAL)),
@@ -68,7 +69,8 @@ def bullet() -> ctypes.PyDLL:
             function.restype, function.argtypes = result, arguments
     except (OSError, AttributeError) as problem:
         raise InputError(
-            f"simulator 'pybullet' needs Bullet's C API, which {spec.origin} does not offer ({problem}); {_HOW_TO_GET_IT}"
+            f"simulator 'pybullet' needs Bullet's C API, which {spec.origin} does not offer ({problem}); "
+            f"{_HOW_TO_GET_IT}"
         ) from problem
     return library
 

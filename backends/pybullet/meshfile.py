@@ -34,8 +34,8 @@ def _obj(body: Body) -> str:
 def _vtk(body: Body) -> str:
     points = [f"{x:.17g} {y:.17g} {z:.17g}" for x, y, z in body.vertices.tolist()]
     cells = [f"4 {a} {b} {c} {d}" for a, b, c, d in body.elements.tolist()]
-    head = ["# vtk DataFile Version 2.0", "muslin", "ASCII", "DATASET UNSTRUCTURED_GRID"]
-    return "\n".join(
-        [*head, f"POINTS {len(points)} double", *points, f"CELLS {len(cells)} {5 * len(cells)}", *cells]
-        + [f"CELL_TYPES {len(cells)}", *["10"] * len(cells), ""]
-    )
+    lines = ["# vtk DataFile Version 2.0", "muslin", "ASCII", "DATASET UNSTRUCTURED_GRID"]
+    lines += [f"POINTS {len(points)} double", *points]
+    lines += [f"CELLS {len(cells)} {5 * len(cells)}", *cells]
+    lines += [f"CELL_TYPES {len(cells)}", *["10"] * len(cells)]
+    return "\n".join(lines) + "\n"

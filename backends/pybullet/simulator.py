@@ -24,7 +24,7 @@ class PybulletSimulator(Simulator):
     name: ClassVar[str] = "pybullet"
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
 
-    def __init__(self, *, time_step: float = 0.005, most_substeps: int = 1000) -> None:
+    def __init__(self, *, time_step: float = 0.005, most_substeps: int = 500) -> None:
         if not 0 < time_step < float("inf"):
             raise InputError(f"simulator 'pybullet': time_step must be positive and finite, but is {time_step!r}")
         if most_substeps < 1:

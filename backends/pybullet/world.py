@@ -1,7 +1,6 @@
 """What cloth and solid worlds share: substeps, held vertices, nodal forces and damping around Bullet's step."""
 
 from abc import abstractmethod
-from typing import ClassVar
 
 import numpy as np
 
@@ -41,9 +40,6 @@ class SoftWorld(World):
         RolloutFailed: a vertex has no mass, or the body is too stiff for its mesh.
     """
 
-    #: Whether elastic forces are computed here and not by Bullet.
-    own_elasticity: ClassVar[bool]
-
     def __init__(
         self,
         scene: Scene,
@@ -55,7 +51,8 @@ class SoftWorld(World):
         body = scene.body
         count = len(body.vertices)
         self.time_step = time_step
-        self.masses = body.vertex_measures * scene.material.density + scene.loads
+        own = body.vertex_measures * scene.material.density
+        self.masses = own + scene.loads
         if not self.masses.min() > 0:
             raise RolloutFailed(f"vertex {int(self.masses.argmin())} has no mass")
         self._held = scene.held
@@ -65,7 +62,7 @@ class SoftWorld(World):
         self._weight = self.masses[:, None] * scene.gravity
         self._positions = body.vertices.astype(np.float64)
         self._velocities = np.zeros((count, 3))
-        self._equal_share = float(self.masses.mean())
+        self._equal_share = float(own.mean())
         self._beta = scene.material.damping_time
 
         lightest = np.minimum(self.masses, self._equal_share)
@@ -100,15 +97,7 @@ class SoftWorld(World):
         pull = (held - self._positions[self._held]) / self.time_step
         x, v = self._positions, self._velocities
         for _ in range(self._substeps):
-            matrix = self._elasticity.strain_matrix(x) if self.own_elasticity or self._beta > 0 else None
-            total = push
-            if self.own_elasticity and matrix is not None:
-                total = push + self._elasticity.forces(matrix, x)
-            v = v + self._pace * total
-            v[self._held] = pull
-            if self._beta > 0 and matrix is not None:
-                v = self._elasticity.damped(matrix, v, self.masses, self._free, self._beta * self._dt)
-            x, v = self._advance(x, v)
+            x, v = self._advance(x, v, push, pull)
         if not np.isfinite(x.sum() + v.sum()):
             raise RolloutFailed("Bullet's positions are not finite")
         if len(self._held):
@@ -119,6 +108,33 @@ class SoftWorld(World):
     def close(self) -> None:
         self._client.close()
 
+    def _kicked(self, velocities: FloatArray, forces: FloatArray, pull: FloatArray) -> FloatArray:
+        """Velocities ``(V, 3)`` [m/s] after ``forces (V, 3)`` [N] acted for a substep; held vertices take ``pull``."""
+        velocities = velocities + self._pace * forces
+        velocities[self._held] = pull
+        return velocities
+
+    def _bullet(self, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Positions and velocities after a step of Bullet that began with ``velocities``."""
+        self._client.set_velocities(velocities)
+        self._client.step()
+        return self._client.positions(), self._client.velocities()
+
     @abstractmethod
-    def _advance(self, positions: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Let Bullet make a substep; positions and velocities after it, in new arrays."""
+    def _advance(
+        self, positions: FloatArray, velocities: FloatArray, push: FloatArray, pull: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Make a substep.
+
+        Damping comes after all other forces but contact: a force that is added behind it would not be
+        balanced at rest by one that went through it.
+
+        Args:
+            positions: ``(V, 3)`` [m], where Bullet has the vertices.
+            velocities: ``(V, 3)`` [m/s].
+            push: forces ``(V, 3)`` [N] other than elastic, damping and contact ones.
+            pull: velocities of the held vertices ``(H, 3)`` [m/s].
+
+        Returns:
+            Positions, to which Bullet's vertices were brought, and velocities; new arrays.
+        """

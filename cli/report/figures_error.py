@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from .gather import Take
+from .findings import Take
 from .style import AFTER, BEFORE, INK, NOISE, RULE, SCATTER, SOFT, look, new_figure, svg
 from .words import shown_unit
 
@@ -16,7 +16,8 @@ def error_ceiling(takes: list[Take]) -> float:
     tops = []
     for t in takes:
         lines = [t.before] if t.after is None else [t.before, t.after]
-        tops.append(max(float(np.nanmax(line)) for line in lines) * shown_unit(t.unit)[0])
+        highest = max([float(np.nanmax(line)) for line in lines] + [2.0 * (t.noise or 0.0)])
+        tops.append(highest * shown_unit(t.unit)[0])
     return 1.12 * max([*tops, 1e-9])
 
 

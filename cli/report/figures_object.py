@@ -1,20 +1,23 @@
 """The object at its worst moment: the predicted mesh coloured by error, and where the points really were."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import FigureBase
-from mpl_toolkits.mplot3d import Axes3D
-from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from ...core.arrays import FloatArray, IntArray
-from .gather import Take
-from .style import ERROR_MAP, INK, SOFT, data_uri, look, new_figure, png
-from .words import shown_unit
+from .findings import Take
+from .style import ERROR_MAP, INK, SOFT, bare, data_uri, look, new_figure, png
+from .words import plain, shown_unit
 
-_ELEVATION = 14.0
+_ELEVATIONS = (8.0, 16.0, 26.0, 36.0)
+#: The colour scale reaches at least so many standard deviations of the noise.
+_PALE = 8.0
+_EDGE = (0.12, 0.15, 0.18, 0.28)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +29,8 @@ class Snapshot:
         predicted, measured: ``(P, 3)``.
         vertices: ``(V, 3)`` or None.
         triangles: ``(F, 3)`` or None.
+        correspondence: measured point p is predicted point p.
+        clamped: vertices that cannot be wrong, because they never move.
     """
 
     title: str
@@ -33,10 +38,12 @@ class Snapshot:
     measured: FloatArray
     vertices: FloatArray | None
     triangles: IntArray | None
+    correspondence: bool = True
+    clamped: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
 
     @property
     def paired(self) -> bool:
-        return self.predicted.shape == self.measured.shape
+        return self.correspondence and self.predicted.shape == self.measured.shape
 
     def errors(self) -> FloatArray:
         """Distance ``(P,)`` of each predicted point to its measured one, or to the nearest without correspondence."""
@@ -53,10 +60,12 @@ class Snapshot:
         known = np.isfinite(errors)
         if not known.any():
             return np.zeros(len(self.vertices))
-        gaps = np.linalg.norm(self.vertices[:, None] - self.predicted[known][None], axis=2)
+        places = np.concatenate([self.predicted[known], self.vertices[self.clamped]])
+        errors = np.concatenate([errors[known], np.zeros(len(self.clamped))])
+        gaps = np.linalg.norm(self.vertices[:, None] - places[None], axis=2)
         scale = max(float(np.ptp(self.vertices, axis=0).max()), 1e-9)
         weights = 1.0 / (gaps + 0.01 * scale) ** 3
-        return np.asarray(weights @ errors[known] / weights.sum(axis=1))
+        return np.asarray(weights @ errors / weights.sum(axis=1))
 
 
 def snapshots(take: Take, after_name: str, frame: int | None = None) -> list[Snapshot]:
@@ -65,11 +74,19 @@ def snapshots(take: Take, after_name: str, frame: int | None = None) -> list[Sna
     if take.measured is None or take.predicted is None:
         return []
     flat = None if take.vertices is None or take.triangles is None else take.vertices[k]
-    out = [Snapshot("model as it is", take.predicted[k], take.measured[k], flat, take.triangles)]
+    out = [Snapshot("fitted model", take.predicted[k], take.measured[k], flat, take.triangles)]
     if take.predicted_after is not None and after_name:
         flat = None if take.vertices_after is None or take.triangles is None else take.vertices_after[k]
         out.append(Snapshot(f"with {after_name}", take.predicted_after[k], take.measured[k], flat, take.triangles))
-    return [_spatial(s) for s in out]
+    clamped = clamped_vertices(take.vertices)
+    return [_spatial(replace(s, correspondence=take.correspondence, clamped=clamped)) for s in out]
+
+
+def clamped_vertices(vertices: FloatArray | None) -> IntArray:
+    """Vertices that stay where they are over all time."""
+    if vertices is None:
+        return np.zeros(0, np.int64)
+    return np.flatnonzero(np.ptp(vertices, axis=0).max(axis=1) < 1e-6)
 
 
 def _spatial(s: Snapshot) -> Snapshot:
@@ -80,82 +97,102 @@ def _spatial(s: Snapshot) -> Snapshot:
     return replace(s, predicted=pad(s.predicted), measured=pad(s.measured), vertices=vertices)
 
 
-def best_azimuth(shots: list[Snapshot]) -> float:
-    """The view angle [degree] from which one sees most of the object and of its error."""
-    cloud = np.concatenate([s.predicted for s in shots])
-    cloud = cloud - cloud.mean(axis=0)
-    gaps = np.concatenate([s.measured - s.predicted if s.paired else np.zeros((1, 3)) for s in shots[:1]])
+def camera(azimuth: float, elevation: float) -> FloatArray:
+    """Rows right, up and towards the eye ``(3, 3)`` of a level view; angles in radians."""
+    ca, sa, ce, se = np.cos(azimuth), np.sin(azimuth), np.cos(elevation), np.sin(elevation)
+    return np.array([[-sa, ca, 0.0], [-ca * se, -sa * se, ce], [ca * ce, sa * ce, se]])
+
+
+def best_view(shots: list[Snapshot]) -> FloatArray:
+    """The view from which one sees most of every object and of the error of the first."""
+    first = shots[0]
+    gaps = first.measured - first.predicted if first.paired else np.zeros((1, 3))
     gaps = gaps[np.isfinite(gaps).all(axis=1)]
-    scores = []
-    angles = np.arange(-165.0, 180.0, 5.0)
-    for angle in np.radians(angles):
-        right = np.array([-np.sin(angle), np.cos(angle), 0.0])
-        up = _up(angle)
-        plane = np.stack([cloud @ right, cloud @ up])
-        area = float(np.sqrt(max(np.linalg.det(np.cov(plane)), 0.0)))
-        error = float(np.sqrt(((gaps @ right) ** 2 + (gaps @ up) ** 2).mean())) if len(gaps) else 0.0
-        front = 1.0 + 0.05 * np.cos(angle + np.radians(60.0))  # of equals, the customary side
-        scores.append((np.sqrt(area) + error) * front)
-    return float(angles[int(np.argmax(scores))])
+    clouds = [s.predicted if s.vertices is None else s.vertices for s in shots]
+    best, view = -np.inf, camera(-1.0, 0.3)
+    for elevation in np.radians(_ELEVATIONS):
+        for azimuth in np.radians(np.arange(-175.0, 180.0, 5.0)):
+            rows = camera(azimuth, elevation)
+            areas = [np.linalg.det(np.cov(rows[:2] @ c.T)) for c in clouds]
+            seen = float(np.mean([max(a, 0.0) ** 0.25 for a in areas]))
+            error = float(np.sqrt(((gaps @ rows[:2].T) ** 2).sum(axis=1).mean())) if len(gaps) else 0.0
+            score = (seen + error) * (1.0 + 0.04 * np.cos(azimuth + 1.0))  # of equals, the customary side
+            if score > best:
+                best, view = score, rows
+    return view
 
 
-def _up(angle: float) -> FloatArray:
-    e = np.radians(_ELEVATION)
-    return np.array([-np.cos(angle) * np.sin(e), -np.sin(angle) * np.sin(e), np.cos(e)])
-
-
-def draw_snapshot(axes: Axes3D, shot: Snapshot, norm: Normalize, centre: FloatArray, half: FloatArray) -> None:
-    """One snapshot within a box of given centre and half sizes [m]."""
+def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray) -> None:
+    """One snapshot in parallel projection, far triangles first."""
+    flat = shot.predicted @ view.T
     if shot.vertices is not None and shot.triangles is not None:
-        errors = shot.vertex_errors()
-        faces = Poly3DCollection(
-            list(shot.vertices[shot.triangles]), linewidths=0.25, edgecolors=(0.12, 0.15, 0.18, 0.35), zorder=1
+        seen, errors = shot.vertices @ view.T, shot.vertex_errors()
+        order = np.argsort(seen[shot.triangles, 2].mean(axis=1))
+        faces = shot.triangles[order]
+        colours = ERROR_MAP(norm(errors[faces].mean(axis=1)))
+        axes.add_collection(
+            PolyCollection(list(seen[faces][..., :2]), facecolors=colours, edgecolors=_EDGE, linewidths=0.35, zorder=1)
         )
-        faces.set_facecolor(ERROR_MAP(norm(errors[shot.triangles].mean(axis=1))))
-        axes.add_collection3d(faces)
     else:
         colours = ERROR_MAP(norm(np.nan_to_num(shot.errors())))
-        axes.scatter(*shot.predicted.T, c=colours, s=26, depthshade=False, edgecolors=SOFT, linewidths=0.3, zorder=1)
+        axes.scatter(flat[:, 0], flat[:, 1], c=colours, s=26, edgecolors=SOFT, linewidths=0.3, zorder=1)
+    there = shot.measured @ view.T
     if shot.paired:
-        pairs = np.stack([shot.predicted, shot.measured], axis=1)
-        seen = np.isfinite(pairs).all(axis=(1, 2))
-        axes.add_collection3d(Line3DCollection(list(pairs[seen]), colors=INK, linewidths=0.7, alpha=0.75, zorder=2))
-    axes.scatter(*shot.measured.T, color=INK, s=7, depthshade=False, linewidths=0, zorder=3)
-    for setter, c, h in zip((axes.set_xlim3d, axes.set_ylim3d, axes.set_zlim3d), centre, half, strict=True):
-        setter(float(c - h), float(c + h))
-    axes.set_box_aspect(tuple(half / half.max()), zoom=1.25)
+        pairs = np.stack([flat[:, :2], there[:, :2]], axis=1)
+        pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))]
+        axes.add_collection(LineCollection(list(pairs), colors=INK, linewidths=0.6, alpha=0.7, zorder=2))
+    axes.scatter(there[:, 0], there[:, 1], color=INK, s=8, linewidths=0, zorder=3)
 
 
-def box(shots: list[Snapshot]) -> tuple[FloatArray, FloatArray]:
-    """Centre and half sizes of everything drawn, never flatter than a quarter of the largest side."""
+def window(shots: list[Snapshot], view: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Low and high corner ``(2,)`` of everything drawn, with a margin."""
     parts = [p for s in shots for p in (s.predicted, s.measured, s.vertices) if p is not None]
-    cloud = np.concatenate(parts)
-    low, high = np.nanmin(cloud, axis=0), np.nanmax(cloud, axis=0)
-    half = 0.5 * (high - low)
-    return 0.5 * (low + high), np.maximum(half, max(0.25 * float(half.max()), 1e-6)) * 1.04
+    flat = np.concatenate(parts) @ view[:2].T
+    low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
+    margin = 0.04 * float((high - low).max()) + 1e-9
+    return low - margin, high + margin
 
 
-def add_snapshots(figure: FigureBase, spots: list[Axes3D], shots: list[Snapshot], unit: str, bar: bool = True) -> None:
-    """Draw snapshots that share one view, one box and one colour scale."""
-    factor, label = shown_unit(unit)
-    with np.errstate(invalid="ignore"):
-        top = max([float(np.nanmax(s.errors())) for s in shots if np.isfinite(s.errors()).any()] or [1e-9])
-    norm = Normalize(0.0, max(top, 1e-9))
-    (centre, half), azimuth = box(shots), best_azimuth(shots)
+def add_snapshots(figure: FigureBase, spots: list[Axes], shots: list[Snapshot], take: Take) -> None:
+    """Draw snapshots that share one view, one window and one colour scale."""
+    factor, label = shown_unit(take.unit)
+    top = heat_top(np.concatenate([s.errors() for s in shots]), take.noise)
+    norm, view = Normalize(0.0, top), best_view(shots)
+    low, high = window(shots, view)
     for axes, shot in zip(spots, shots, strict=True):
-        axes.set_proj_type("ortho")
-        axes.computed_zorder = False
-        axes.view_init(elev=_ELEVATION, azim=azimuth)
-        axes.set_axis_off()
-        draw_snapshot(axes, shot, norm, centre, half)
+        draw_snapshot(axes, shot, norm, view)
+        axes.set_xlim(float(low[0]), float(high[0]))
+        axes.set_ylim(float(low[1]), float(high[1]))
+        axes.set_aspect("equal")
+        bare(axes)
         mean = float(np.sqrt(np.nanmean(shot.errors() ** 2))) * factor
-        axes.set_title(f"{shot.title}\n{mean:.3g} {label} off", fontsize=9.5, color=INK, y=0.99)
-    if bar:
-        scale = ScalarMappable(Normalize(0.0, norm.vmax * factor if norm.vmax else 1.0), ERROR_MAP)
-        drawn = figure.colorbar(scale, ax=spots, shrink=0.6, aspect=26, pad=0.02)
-        drawn.outline.set_visible(False)  # type: ignore[operator]
-        drawn.set_label(f"distance [{label}]", color=SOFT)
-        drawn.ax.tick_params(length=0)
+        axes.set_title(f"{shot.title}: points {plain(mean)} {label} away", fontsize=9.5, color=INK)
+    _scale_bar(spots[0], low, high, factor, label)
+    drawn = figure.colorbar(
+        ScalarMappable(Normalize(0.0, top * factor), ERROR_MAP), ax=spots, shrink=0.7, aspect=28, pad=0.02
+    )
+    drawn.outline.set_visible(False)
+    drawn.set_label(f"distance [{label}]", color=SOFT)
+    drawn.ax.tick_params(length=0)
+
+
+def heat_top(errors: FloatArray, noise: float | None) -> float:
+    """The error of the darkest colour: the largest there is, but so large that noise alone stays pale."""
+    largest = float(np.nanmax(errors)) if np.isfinite(errors).any() else 0.0
+    return max(largest, _PALE * (noise or 0.0), 1e-9)
+
+
+def _scale_bar(axes: Axes, low: FloatArray, high: FloatArray, factor: float, label: str) -> None:
+    size = round_length(0.25 * float(high[0] - low[0]) * factor)
+    x, y = float(low[0]), float(low[1])
+    axes.plot([x, x + size / factor], [y, y], color=SOFT, linewidth=1.4, clip_on=False, solid_capstyle="butt")
+    axes.annotate(f"{size:g} {label}", (x, y), (0, 3), textcoords="offset points", fontsize=7.5, color=SOFT)
+
+
+def round_length(x: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is not above ``x``."""
+    ten = 10.0 ** np.floor(np.log10(x))
+    return float(max(m * ten for m in (1.0, 2.0, 5.0) if m * ten <= x * (1 + 1e-9)))
 
 
 def object_figure(take: Take, after_name: str) -> str | None:
@@ -163,8 +200,10 @@ def object_figure(take: Take, after_name: str) -> str | None:
     shots = snapshots(take, after_name)
     if not shots or not np.isfinite(shots[0].predicted).all():
         return None
+    low, high = window(shots, best_view(shots))
+    tall = float(np.clip((high[1] - low[1]) / (high[0] - low[0]), 0.4, 1.25))
     with look():
-        figure = new_figure(4.4 * len(shots) + 0.8, 4.4)
-        spots = [figure.add_subplot(1, len(shots), i + 1, projection="3d") for i in range(len(shots))]
-        add_snapshots(figure, spots, shots, take.unit)
+        figure = new_figure(4.4 * len(shots) + 0.9, 4.4 * tall + 0.4)
+        spots = list(figure.subplots(1, len(shots), squeeze=False)[0])
+        add_snapshots(figure, spots, shots, take)
         return data_uri(png(figure, 150))

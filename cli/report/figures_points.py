@@ -6,7 +6,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from ...core.arrays import FloatArray
-from .gather import Take
+from .findings import Take
 from .style import AFTER, BEFORE, ERROR_MAP, INK, RULE, SOFT, bare, look, new_figure, svg
 from .words import shown_unit
 
@@ -14,22 +14,34 @@ _MOST_BARS = 12
 
 
 def flat_layout(points: FloatArray) -> FloatArray:
-    """Points ``(P, 3)`` on the plane ``(P, 2)`` in which they spread most; up stays up."""
+    """Points ``(P, A)`` on the plane ``(P, 2)`` in which they spread most; up stays up, or else x stays right."""
     known = np.isfinite(points).all(axis=1)
     centred = points - points[known].mean(axis=0)
-    axes = np.linalg.svd(centred[known], full_matrices=True)[2]
-    first, second = axes[0], axes[1]
-    vertical = -1
-    if abs(first[vertical]) > abs(second[vertical]):
-        first, second = second, first
-    second = second if second[vertical] >= 0 else -second
-    first = first if first[int(np.abs(first).argmax())] >= 0 else -first
-    return np.stack([centred @ first, centred @ second], axis=1)
+    if points.shape[1] == 2:
+        return np.asarray(centred)
+    normal = np.linalg.svd(centred[known], full_matrices=True)[2][2]
+    up = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
+    if np.linalg.norm(up) > 0.3:
+        up /= np.linalg.norm(up)
+        right = np.cross(up, normal)
+    else:
+        right = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
+        right /= np.linalg.norm(right)
+        up = np.cross(normal, right)
+        up = up if up[1] >= 0 else -up
+    right = right if right[int(np.abs(right).argmax())] >= 0 else -right
+    return np.stack([centred @ right, centred @ up], axis=1)
 
 
 def points_figure(take: Take, index: int) -> str | None:
     """SVG: a map of the points, before and after, and a bar a point if they are few."""
-    if take.point_before is None or take.measured is None or len(take.point_before) != take.measured.shape[1]:
+    if (
+        not take.correspondence
+        or take.point_before is None
+        or take.measured is None
+        or len(take.point_before) != take.measured.shape[1]
+        or not np.isfinite(take.point_before).any()
+    ):
         return None
     factor, unit = shown_unit(take.unit)
     before = take.point_before * factor
@@ -38,13 +50,15 @@ def points_figure(take: Take, index: int) -> str | None:
     first = int(seen.sum(axis=1).argmax())
     place = flat_layout(take.measured[first])
     maps = [before] if after is None else [before, after]
-    norm = Normalize(0.0, float(np.nanmax(before)))
+    norm = Normalize(0.0, max(float(np.nanmax(before)), 4.0 * (take.noise or 0.0) * factor))
     with look(f"points{index}"):
         figure = new_figure(5.4, 2.7)
         grid = figure.subplots(1, len(maps) + 1, width_ratios=[1.0] * len(maps) + [0.85])
         size = float(np.clip(2600 / len(before), 12, 90))
         for axes, values, title in zip(grid, maps, ("before", "after"), strict=False):
-            axes.scatter(*place.T, c=values, s=size, cmap=ERROR_MAP, norm=norm, edgecolors=SOFT, linewidths=0.35)
+            axes.scatter(
+                *place.T, c=values, s=size, cmap=ERROR_MAP, norm=norm, edgecolors=SOFT, linewidths=0.35, clip_on=False
+            )
             axes.set_aspect("equal", adjustable="datalim")
             axes.margins(0.1)
             axes.set_title(title, color=INK)
@@ -54,7 +68,7 @@ def points_figure(take: Take, index: int) -> str | None:
         drawn = figure.colorbar(
             ScalarMappable(norm, ERROR_MAP), ax=list(grid[:-1]), location="bottom", shrink=0.7, aspect=30, pad=0.03
         )
-        drawn.outline.set_visible(False)  # type: ignore[operator]
+        drawn.outline.set_visible(False)
         drawn.set_label(f"error of a point over all time [{unit}]", color=SOFT)
         drawn.ax.tick_params(length=0)
         return svg(figure, f"error of each point of recording {take.name}")

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from ...core.arrays import FloatArray
-from .gather import Posterior
-from .style import AFTER, BEFORE, INK, RULE, SOFT, look, new_figure, svg
+from .findings import Posterior
+from .style import AFTER, BEFORE, INK, SOFT, look, new_figure, svg
 from .words import words
 
 _SHADE = "#f1efe8"
@@ -25,6 +26,7 @@ class Axis:
     log: bool
     draws: FloatArray
     after: FloatArray | None = None
+    estimate: float | None = None
 
     @property
     def label(self) -> str:
@@ -46,7 +48,8 @@ def axes_of(fit: Posterior, after: Posterior | None = None) -> list[Axis]:
             later = after.samples[:, after.names.index(name)] if after is not None and name in after.names else None
             first = source.samples[:, i] if source is fit else np.zeros(0)
             log = a["scale"][i] == "log"
-            out.append(Axis(name, a["units"][i], float(a["low"][i]), float(a["high"][i]), log, first, later))
+            best = float(source.estimate[i])
+            out.append(Axis(name, a["units"][i], float(a["low"][i]), float(a["high"][i]), log, first, later, best))
     return out
 
 
@@ -80,6 +83,8 @@ def marginal_figure(axis: Axis, index: int) -> str:
             axes.fill_between(at, 0, y, color=colour, alpha=0.16, linewidth=0)
             axes.plot(at, y, color=colour, linewidth=1.4, solid_capstyle="round")
             axes.plot([np.mean(draws)], [0], "^", color=colour, markersize=5, clip_on=False, zorder=5)
+        if axis.estimate is not None:
+            axes.axvline(axis.estimate, color=INK, linewidth=0.9, linestyle=(0, (3, 2)), zorder=4)
         margin = 0.04 * (high - low)
         ends = np.array([low - margin, high + margin])
         if axis.log:
@@ -101,7 +106,7 @@ def _ticks(axes: Axes, axis: Axis, which: str) -> None:
         side.set_minor_formatter(NullFormatter())
         side.set_minor_locator(NullLocator())
     else:
-        side.set_major_locator(MaxNLocator(4))
+        side.set_major_locator(MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]))
     axes.tick_params(axis="x" if which == "x" else "y", length=2, width=0.5, color=SOFT)
 
 
@@ -130,8 +135,6 @@ def pair_figure(axes_list: list[Axis], limit: int = 4) -> str | None:
                 axes.set(xscale="log" if x.log else "linear", yscale="log" if y.log else "linear")
                 _ticks(axes, x, "x")
                 _ticks(axes, y, "y")
-                axes.grid(color=RULE, linewidth=0.4)
-                axes.set_axisbelow(True)
                 _window(axes, x, y)
                 axes.set_xlabel(x.label if r == n - 1 else "")
                 axes.set_ylabel(y.label if c == 0 else "")
@@ -141,5 +144,11 @@ def pair_figure(axes_list: list[Axis], limit: int = 4) -> str | None:
 
 def _window(axes: Axes, x: Axis, y: Axis) -> None:
     """The whole prior box, so that the eye sees how much of it is left."""
-    axes.set_xlim(x.low, x.high)
-    axes.set_ylim(y.low, y.high)
+    for axis, setter in ((x, axes.set_xlim), (y, axes.set_ylim)):
+        low, high = axis.flat(np.array([axis.low, axis.high]))
+        ends = np.array([low, high]) + np.array([-0.05, 0.05]) * (high - low)
+        ends = 10**ends if axis.log else ends
+        setter(float(ends[0]), float(ends[1]))
+    corner, width, height = (x.low, y.low), x.high - x.low, y.high - y.low
+    axes.add_patch(Rectangle(corner, width, height, color=_SHADE, linewidth=0, zorder=0))
+    axes.spines[["left", "bottom"]].set_visible(False)

@@ -1,132 +1,18 @@
-"""Everything the report shows, read from the results store into plain values; arrays are in metres."""
+"""Everything the report shows, read from the results store."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 import zarr
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray
 from ...core.errors import MuslinError, StepMissingError
 from ...core.measurement_store import read_hidden
 from ...core.store import read
 from ...core.study.study import Study
-
-Table = dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Take:
-    """One recording held against the model.
-
-    Args:
-        row: its line of the comparison: ``rmse``, ``noise``, ``worst_time`` and so on.
-        time: ``(T,)`` [s].
-        before, after, scatter: error over time ``(T,)``; None where not known.
-        measured, predicted, predicted_after: ``(T, P, 3)``.
-        vertices, vertices_after: ``(T, V, 3)``.
-        triangles: ``(F, 3)``.
-        point_before, point_after: error of each point over all time ``(P,)``.
-        rmse_after: with the effect.
-    """
-
-    name: str
-    role: str
-    row: Table
-    time: FloatArray
-    before: FloatArray
-    after: FloatArray | None = None
-    scatter: FloatArray | None = None
-    measured: FloatArray | None = None
-    predicted: FloatArray | None = None
-    predicted_after: FloatArray | None = None
-    vertices: FloatArray | None = None
-    vertices_after: FloatArray | None = None
-    triangles: IntArray | None = None
-    point_before: FloatArray | None = None
-    point_after: FloatArray | None = None
-    rmse_after: float | None = None
-
-    @property
-    def held_out(self) -> bool:
-        return self.role != "fit"
-
-    @property
-    def unit(self) -> str:
-        return str(self.row.get("unit", "m"))
-
-    @property
-    def rmse(self) -> float:
-        return float(self.row["rmse"])
-
-    @property
-    def noise(self) -> float | None:
-        return number(self.row.get("noise"))
-
-    @property
-    def worst_frame(self) -> int:
-        worst = number(self.row.get("worst_time"))
-        if worst is None:
-            return int(np.nanargmax(self.before))
-        return int(np.abs(self.time - worst).argmin())
-
-
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """A finished fit."""
-
-    attrs: Table
-    samples: FloatArray
-    estimate: FloatArray
-    estimate_sd: FloatArray
-
-    @property
-    def names(self) -> list[str]:
-        return [str(n) for n in self.attrs["parameters"]]
-
-
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """What a study has found so far.
-
-    Args:
-        study: it all comes from.
-        fit: always there.
-        fit_after: of the study with the effect added.
-        compare: attributes of the comparison, or None before that step.
-        diagnose: ``result`` of the diagnosis, or None.
-        paragraphs: the diagnosis in words.
-        takes: one a recording, held-out ones with the largest error first.
-        after_name: what "after" has that "before" has not, or "" if there is no after.
-        after_inferred: "after" comes from a whole fit of its own, not from the diagnosis.
-        hidden: label of a generated measurement.
-    """
-
-    study: Study
-    fit: Posterior
-    fit_after: Posterior | None = None
-    compare: Table | None = None
-    diagnose: Table | None = None
-    paragraphs: list[str] = field(default_factory=list)
-    takes: list[Take] = field(default_factory=list)
-    after_name: str = ""
-    after_inferred: bool = False
-    after: Study | None = None
-    hidden: Table | None = None
-
-    @property
-    def candidates(self) -> list[Table]:
-        return list((self.diagnose or {}).get("candidates") or [])
-
-
-def number(value: Any) -> float | None:
-    """A finite number, or None."""
-    try:
-        out = float(value)
-    except (TypeError, ValueError):
-        return None
-    return out if np.isfinite(out) else None
+from .findings import Findings, Posterior, Table, Take, number
 
 
 def gather(study: Study, after: Study | None = None) -> Findings:
@@ -143,8 +29,9 @@ def gather(study: Study, after: Study | None = None) -> Findings:
         name = ", ".join(e for e in after.config.effects if e not in study.config.effects) or after.path.stem
     else:
         name = _shown_effect(result)
-    takes = _takes(compare, diagnose, other)
-    if not any(t.after is not None for t in takes):
+    takes = _takes(compare, diagnose, other, _correspondence(study))
+    if not name or not any(t.after is not None for t in takes):
+        takes = [t.without_after() for t in takes]
         name = ""
     after_fit = _step(after, "fit") if after is not None else None
     text = diagnose.attrs.get("text", []) if diagnose is not None else []
@@ -183,7 +70,15 @@ def _shown_effect(result: Table | None) -> str:
     if result.get("effects"):
         return ", ".join(result["effects"]) if result.get("verdict") == "named" else str(result["effects"][0])
     candidates = result.get("candidates") or []
-    return str(candidates[0]["name"]) if candidates else ""
+    return str(candidates[0]["name"]) if candidates and result.get("verdict") != "no-misfit" else ""
+
+
+def _correspondence(study: Study) -> dict[str, bool]:
+    """By recording; empty if the measurement has been moved away since."""
+    try:
+        return {r.name: r.series.correspondence for r in study.measurement.recordings}
+    except MuslinError:
+        return {}
 
 
 def _hidden(study: Study) -> Table | None:
@@ -193,7 +88,9 @@ def _hidden(study: Study) -> Table | None:
         return None
 
 
-def _takes(compare: zarr.Group | None, diagnose: zarr.Group | None, other: zarr.Group | None) -> list[Take]:
+def _takes(
+    compare: zarr.Group | None, diagnose: zarr.Group | None, other: zarr.Group | None, paired: Mapping[str, bool]
+) -> list[Take]:
     if compare is None:
         return []
     rows = cast(Sequence[Mapping[str, Any]], compare.attrs["rows"])
@@ -205,7 +102,8 @@ def _takes(compare: zarr.Group | None, diagnose: zarr.Group | None, other: zarr.
         if not isinstance(group, zarr.Group):
             continue
         kept = _child(other, name) if other is not None else _child(diagnose, name)
-        takes.append(_take(name, dict(row), group, kept, other is not None, after_rows.get(name)))
+        take = _take(name, dict(row), group, kept, other is not None, after_rows.get(name))
+        takes.append(replace(take, correspondence=paired.get(name, True)))
     return sorted(takes, key=lambda t: (not t.held_out, -t.rmse))
 
 
@@ -227,36 +125,45 @@ def _take(
     time = np.asarray(read(group, "time"), float)
     suffix = "" if inferred else "_after"
     after = _array(kept, f"error{suffix}", time)
-    measured, predicted_after = _array(group, "measured"), _array(kept, f"predicted{suffix}", time)
+    predicted_after = _array(kept, f"predicted{suffix}", time)
     rmse_after = number((after_row or {}).get("rmse"))
     if rmse_after is None and after is not None and np.isfinite(after).any():
         rmse_after = float(np.sqrt(np.nanmean(after**2)))
+    before = _array(kept, "error_before", time) if not inferred else None
+    measured, predicted = _array(group, "measured"), _array(group, "predicted")
+    vertices, points = _array(group, "vertices"), _array(group, "point_error")
+    refitted = _array(kept, "predicted_before", time) if before is not None else None
+    if refitted is not None:  # the diagnosis refits the plain model too, so that both had the same chance
+        predicted, vertices = refitted, _array(kept, "vertices_before", time)
+        refitted_points = point_error(predicted, measured)
+        points = points if refitted_points is None else refitted_points
     triangles = _array(group, "triangles")
     return Take(
         name=name,
         role=str(row.get("role", "fit")),
         row=row,
         time=time,
-        before=np.asarray(read(group, "error"), float),
+        before=np.asarray(read(group, "error"), float) if before is None else before,
         after=after,
         scatter=_array(group, "scatter", time),
         measured=measured,
-        predicted=_array(group, "predicted"),
+        predicted=predicted,
         predicted_after=predicted_after,
-        vertices=_array(group, "vertices"),
+        vertices=vertices,
         vertices_after=_array(kept, f"vertices{suffix}", time),
         triangles=None if triangles is None else triangles.astype(np.int64),
-        point_before=_array(group, "point_error"),
+        point_before=points,
         point_after=point_error(predicted_after, measured),
+        rmse_before=None if before is None else float(np.sqrt(np.nanmean(before**2))),
         rmse_after=rmse_after,
     )
 
 
 def point_error(predicted: FloatArray | None, measured: FloatArray | None) -> FloatArray | None:
-    """Root mean square over time of each point's distance ``(P,)``; None if points do not correspond."""
+    """Root mean square of each point over time and axes ``(P,)``; None if points do not correspond."""
     if predicted is None or measured is None or predicted.shape != measured.shape:
         return None
-    square = ((predicted - measured) ** 2).sum(axis=2)
+    square = ((predicted - measured) ** 2).mean(axis=2)
     seen = np.isfinite(square)
     mean = np.where(seen, square, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
     return np.asarray(np.where(seen.any(axis=0), np.sqrt(mean), np.nan))

@@ -7,7 +7,6 @@ from .figures_object import add_snapshots, snapshots
 from .gather import gather
 from .style import AFTER, BEFORE, INK, look, new_figure, png
 from .verdict import verdict
-from .words import words
 
 
 def draw_overview(study: Study, after: Study | None = None) -> bytes:
@@ -19,20 +18,23 @@ def draw_overview(study: Study, after: Study | None = None) -> bytes:
     found = gather(study, after)
     if not found.takes:
         raise StepMissingError(f"{study.path} has no result of 'compare' yet; run: muslin compare {study.path}")
-    take, name = found.takes[0], words(found.after_name)
+    take, name = found.takes[0], found.after_label
     with look("overview"):
         figure = new_figure(13.0, 4.6)
         figure.suptitle(verdict(found).headline, x=0.012, ha="left", fontsize=13, color=INK)
-        left, right = figure.subfigures(1, 2, width_ratios=[1.0, 1.25])
+        left, right = list(figure.subfigures(1, 2, width_ratios=[1.0, 1.25], squeeze=False)[0])
         axes = left.add_subplot()
         draw_error(axes, take, error_ceiling([take]))
         held = ", held out" if take.held_out else ""
         axes.set_title(f"recording {take.name}{held}", loc="left", color=INK, fontsize=10)
-        key = [("model as it is", BEFORE), (f"with {name}", AFTER)][: 2 if take.after is not None else 1]
+        white = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+        key = [("fitted model", BEFORE), (f"with {name}", AFTER)][: 2 if take.after is not None else 1]
         for i, (label, colour) in enumerate([*key, ("grey: noise", "#8b8d8a")]):
-            axes.text(0.015, 0.97 - 0.065 * i, label, color=colour, transform=axes.transAxes, fontsize=9, va="top")
+            axes.text(
+                0.015, 0.97 - 0.065 * i, label, color=colour, transform=axes.transAxes, fontsize=9, va="top", bbox=white
+            )
         shots = snapshots(take, name)
         if shots:
-            spots = [right.add_subplot(1, len(shots), i + 1, projection="3d") for i in range(len(shots))]
-            add_snapshots(right, spots, shots, take.unit)
+            spots = list(right.subplots(1, len(shots), squeeze=False)[0])
+            add_snapshots(right, spots, shots, take)
         return png(figure, 140)

@@ -78,7 +78,8 @@ def svg(figure: Figure, alt: str) -> str:
     text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r"\1", text, count=1)
     text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
     safe = alt.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace('"', "&quot;")
-    return text.replace("<svg", f'<svg role="img" aria-label="{safe}"', 1)
+    widest = round(figure.get_figwidth() * 96 * 1.25)
+    return text.replace("<svg", f'<svg role="img" aria-label="{safe}" style="max-width:{widest}px"', 1)
 
 
 def png(figure: Figure, dpi: int = 170) -> bytes:

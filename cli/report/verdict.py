@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from ...core.errors import MuslinError
 from ...core.scenarios import preset
-from .gather import Findings
-from .words import errors, length, number, sentence, words
+from .findings import Findings, number
+from .words import errors, length, sentence, words
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def verdict(found: Findings) -> Verdict:
         )
     e = errors(found)
     numbers = f"{length(e['before'], e['unit'])} on the {e['on']} recordings, noise {length(e['noise'], e['unit'])}"
-    detail = str(found.compare.get("text", ""))
+    detail = (str(found.compare.get("text") or "").splitlines() or [""])[-1]  # a table comes before it
     if found.compare.get("adequate"):
         return Verdict("adequate", "good", f"The fitted model explains the recordings: error {numbers}.", detail)
     return Verdict(
@@ -70,7 +70,9 @@ def _diagnosed(found: Findings) -> Verdict:
     effects = [str(n) for n in result.get("effects") or []]
     named = " and ".join(words(n) for n in effects)
     best = next((c for n in effects for c in found.candidates if c["name"] == n), None)
-    detail = sentence(best, e["unit"], e["noise"], thing(found)) if best else " ".join(found.paragraphs[:1])
+    detail = " ".join(found.paragraphs[:1])
+    if best is not None and result["verdict"] == "named":
+        detail = sentence(best, e["unit"], e["noise"], thing(found), errors=False)
     floor = f"noise {noise}"
     if result["verdict"] == "named":
         drop = f"the {e['on']} error falls from {before} to {after} ({floor})"
@@ -82,14 +84,14 @@ def _diagnosed(found: Findings) -> Verdict:
     if result["verdict"] == "tied":
         rivals = " or ".join(words(n) for n in effects)
         text = f"Something is missing, {rivals}; these recordings cannot tell which. The error is {before}, {floor}."
-        return Verdict("tied", "open", text, " ".join(found.paragraphs) or detail)
+        return Verdict("tied", "open", text, detail)
     text = {
         "none": f"The model misses the measurement by {before} where noise is {noise}, and no candidate explains it.",
         "cannot-tell": f"The error is {before} at {floor}; these recordings cannot show what is missing.",
-        "no-misfit": f"Nothing is missing: the {e['on']} error is {before}, {floor}.",
+        "no-misfit": f"Nothing is seen to be missing: the {e['on']} error is {before}, {floor}.",
     }.get(str(result["verdict"]), f"Verdict: {result['verdict']}.")
     tone = {"none": "bad", "no-misfit": "good"}.get(str(result["verdict"]), "open")
-    return Verdict(words(str(result["verdict"])), tone, text, " ".join(found.paragraphs))
+    return Verdict(words(str(result["verdict"])), tone, text, detail)
 
 
 def _cap(text: str) -> str:

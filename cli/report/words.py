@@ -5,12 +5,11 @@ from typing import Any
 
 from ...core.errors import MuslinError
 from ...core.registry import REGISTRY
-from .gather import Findings, Table, number
+from .findings import Findings, Table, number
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_UNSEEN = ("cannot", "could not", "can not", "not seen", "unseen", "invisible", "hidden", "not identif")
-#: Below this share of its own trace a candidate counts as not seen.
-_OWN_SHARE = 0.1
+NBSP = "\u00a0"
+_UNSEEN = ("cannot", "could not", "not seen", "not visible", "unseen", "invisible")
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
@@ -22,7 +21,7 @@ def length(value: Any, unit: str = "m") -> str:
     """An error with its unit, to two or three figures."""
     factor, label = shown_unit(unit)
     x = number(value)
-    return f"{plain(x * factor)} {label}" if x is not None else "–"
+    return f"{plain(x * factor)}{NBSP}{label}" if x is not None else "–"
 
 
 def plain(x: float) -> str:
@@ -39,6 +38,7 @@ def plain(x: float) -> str:
 def scientific(x: float, figures: int) -> str:
     """``1.4 × 10⁻⁵``."""
     mantissa, exponent = f"{x:.{max(figures - 1, 0)}e}".split("e")
+    mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
 
 
@@ -52,7 +52,8 @@ def value(x: Any, unit: str = "1") -> str:
 
 
 def with_unit(text: str, unit: str) -> str:
-    return text.replace("-", "−") if unit in ("1", "-", "") else f"{text.replace('-', '−')} {unit}"
+    """A number and its unit, kept on one line."""
+    return text.replace("-", "−") if unit in ("1", "-", "") else f"{text.replace('-', '−')}{NBSP}{unit}"
 
 
 def spread(mean: Any, sd: Any, unit: str = "1") -> str:
@@ -73,8 +74,8 @@ def _rounded(m: float, s: float) -> str:
     if s * 10**digits < 1.95:
         digits += 1
     if digits <= 0:
-        return f"{round(m, digits):.0f} ± {round(s, digits):.0f}"
-    return f"{m:.{digits}f} ± {s:.{digits}f}"
+        return f"{round(m, digits):.0f}{NBSP}±{NBSP}{round(s, digits):.0f}"
+    return f"{m:.{digits}f}{NBSP}±{NBSP}{s:.{digits}f}"
 
 
 def words(name: str) -> str:
@@ -93,7 +94,7 @@ def symptom(effect: str) -> str:
 def share(x: Any) -> str:
     """A fraction in percent."""
     v = number(x)
-    return f"{100 * v:.0f} %" if v is not None else "–"
+    return f"{100 * v:.0f}{NBSP}%" if v is not None else "–"
 
 
 def coefficients(candidate: Table) -> list[str]:
@@ -110,7 +111,7 @@ def unseen(candidate: Table) -> bool:
     if isinstance(said, str):
         return any(w in said.lower() for w in _UNSEEN)
     own = number(said)
-    return own < _OWN_SHARE if own is not None else candidate.get("z") is None
+    return own <= 0.0 if own is not None else candidate.get("z") is None
 
 
 def identifiability(candidate: Table) -> str:
@@ -119,15 +120,13 @@ def identifiability(candidate: Table) -> str:
     if isinstance(said, str):
         return said
     own = number(said)
-    if own is None:
-        return "cannot be seen in these data" if unseen(candidate) else "–"
-    if own < _OWN_SHARE:
-        return f"cannot be seen: refitting the parameters hides {share(1 - own)} of it"
-    return f"seen: {share(own)} of its trace is its own"
+    if unseen(candidate):
+        return "no: too weak, or hidden by the parameters"
+    return "–" if own is None else f"yes: {share(own)} of its trace is unlike the parameters"
 
 
-def sentence(candidate: Table, unit: str, noise: Any, thing: str = "object") -> str:
-    """The finding about one candidate, as a person would say it."""
+def sentence(candidate: Table, unit: str, noise: Any, thing: str = "object", *, errors: bool = True) -> str:
+    """The finding about one candidate, as a person would say it; ``errors`` adds those before and after."""
     parts = []
     seen = symptom(str(candidate["name"]))
     if seen:
@@ -139,7 +138,7 @@ def sentence(candidate: Table, unit: str, noise: Any, thing: str = "object") -> 
         said = f"{name}: {text}" if text else name
     parts.append(said)
     before, after = number(candidate.get("held_out_before")), number(candidate.get("held_out_after"))
-    if before is not None and after is not None:
+    if errors and before is not None and after is not None:
         floor = f", noise {length(noise, unit)}" if number(noise) is not None else ""
         parts.append(f"held-out error {length(before, unit)} → {length(after, unit)}{floor}")
     out = "; ".join(parts) + "."
@@ -155,13 +154,15 @@ def errors(found: Findings) -> Table:
     mean = _root_mean([t.rmse for t in takes])
     noise = _root_mean([t.noise for t in takes])
     fitted = found.fit.attrs.get("noise") or {}
-    out["noise"] = next((n for n in (number(said.get("noise")), noise, number(fitted.get("sd"))) if n is not None), None)
+    floors = (number(said.get("noise")), noise, number(fitted.get("sd")))
+    out["noise"] = next((n for n in floors if n is not None), None)
     out["before"], out["after"] = mean, None
+    named = (found.diagnose or {}).get("verdict") == "named"
     if found.after_inferred:
         out["after"] = _root_mean([t.rmse_after for t in takes])
     elif said:
         out["before"] = number(said.get("before")) or mean
-        out["after"] = number(said.get("after"))
+        out["after"] = number(said.get("after")) if named else None
     if takes and not said:
         out["unit"] = takes[0].unit
     return out

@@ -9,7 +9,7 @@ from ..errors import InputError, MissingFileError
 from ..measurement import Recording
 from ..motion import Motion
 from ..series import PointSeries
-from .axes import turned
+from .axes import TURNS, turned
 from .c3d import read_c3d
 from .csv_points import read_csv
 from .gripper import read_gripper_csv, to_motion
@@ -35,6 +35,8 @@ def import_file(path: Path, options: ImportOptions | None = None) -> list[Record
     """
     options = options or ImportOptions()
     _check_file(path)
+    if options.up not in TURNS:
+        raise InputError(f"--up must be x, y or z, but is {options.up!r}")
     reader = FORMATS.get(path.suffix.lower())
     if reader is None:
         known = ", ".join(FORMATS)

@@ -29,7 +29,7 @@ def unit_named(text: str, where: str) -> str:
     for unit, spellings in _SPELLINGS.items():
         if text.strip().lower() in spellings:
             return unit
-    raise InputError(f"{where}: unit {text!r} is not known; units are {', '.join(_SPELLINGS)} (say it with --unit)")
+    raise InputError(f"{where}: unit {text!r} is not known; units are {', '.join(_SPELLINGS)}; say which with --unit")
 
 
 def to_si(points: FloatArray, unit: str, where: str) -> tuple[FloatArray, PointUnit]:

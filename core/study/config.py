@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from ..errors import InputError, MissingFileError
 from ..registry import nearest
+from ..store import storage_errors
 
 
 class _Table(BaseModel):
@@ -124,7 +125,8 @@ def parse_config(table: dict[str, Any], where: str) -> StudyConfig:
             elif e["type"] == "missing":
                 lines.append(f"[{place}] is missing")
             else:
-                lines.append(f"[{place}] {e['msg'].removeprefix('Value error, ')}; got {e['input']!r:.80}")
+                got = "" if isinstance(e["input"], dict) else f"; got {e['input']!r:.80}"
+                lines.append(f"[{place}] {e['msg'].removeprefix('Value error, ')}{got}")
         raise InputError(f"{where}: " + "; ".join(lines)) from error
 
 
@@ -140,6 +142,8 @@ def read_config(path: Path) -> StudyConfig:
     """Read a study file."""
     if not path.exists():
         raise MissingFileError(f"there is no study file {path}; make one with: muslin new {path} --measurement ...")
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name the study file in it")
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -151,5 +155,9 @@ def write_config(config: StudyConfig, path: Path) -> None:
     """Write a study file, without the keys that were left at their default."""
     table = config.model_dump(exclude_defaults=True, exclude_none=True)
     partial = path.with_name(f".{path.name}.partial")
-    partial.write_text(tomli_w.dumps(table), encoding="utf-8")
-    partial.replace(path)
+    with storage_errors(path):
+        try:
+            partial.write_text(tomli_w.dumps(table), encoding="utf-8")
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)

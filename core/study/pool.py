@@ -2,12 +2,17 @@
 
 import contextlib
 import os
+import threading
+import time
+import signal
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
 from types import TracebackType
+
+from threadpoolctl import threadpool_limits
 
 from ..errors import RolloutFailed
 from ..rollout import Trajectory
@@ -37,6 +42,19 @@ _PROBLEM: Problem | None = None
 def _start_worker(problem: Problem) -> None:
     global _PROBLEM
     _PROBLEM = problem
+    # One thread of linear algebra a process: more only get in each other's way, and the order in which
+    # they add up would make results depend on the number of workers.
+    threadpool_limits(1)
+    threading.Thread(target=_die_with_parent, args=(os.getppid(),), daemon=True).start()
+
+
+def _die_with_parent(parent: int) -> None:
+    """A parent that is killed outright cannot end its workers; they notice and end themselves."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+    # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _run(problem: Problem, task: Task) -> Outcome:
@@ -88,8 +106,9 @@ class SimulationPool:
         tasks = list(tasks)
         self.count += len(tasks)
         if self.workers == 1:
-            for task in tasks:
-                yield _run(self.problem, task)
+            with threadpool_limits(1):
+                for task in tasks:
+                    yield _run(self.problem, task)
             return
         futures: list[Future[Outcome]] = [self._open().submit(_run_in_worker, t) for t in tasks]
         for k, future in enumerate(futures):

@@ -145,6 +145,8 @@ def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Reco
         raise InputError(
             f"recording {recording.name!r} is in pixels; only points in metres can be compared without a camera"
         )
+    if points.shape[2] != 3:
+        raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
     if choice == "bound":
         seen = recording.series.valid[0]
         if not seen.all():

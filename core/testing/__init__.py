@@ -1,1 +1,16 @@
-"""Conformance kits for plugins."""
+"""Conformance kits for plugins. They need no test framework: a check raises AssertionError with a sentence.
+
+::
+
+    from muslin.core.testing import check_simulator
+
+    def test_my_simulator():
+        check_simulator(MySimulator)
+"""
+
+from .effects import check_effect
+from .extractors import check_extractor
+from .kits import KITS, run_checks
+from .simulators import check_simulator
+
+__all__ = ["KITS", "check_effect", "check_extractor", "check_simulator", "run_checks"]

@@ -1,7 +1,7 @@
 """One candidate effect: screened over its prior, refitted jointly with the parameters, held out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import stats
@@ -43,7 +43,7 @@ class Candidate:
         """Mean, standard deviation and unit of every coefficient."""
         low = np.array([p.low for p in self.space])
         span = np.array([p.high for p in self.space]) - low
-        sd = np.sqrt(np.diag(self.fit.covariance)) * np.sqrt(max(1.0, self.rss / len(self.fit.white)))
+        sd = np.sqrt(np.diag(self.fit.covariance)) * np.sqrt(max(1.0, self.rss / self.fit.count))
         return {
             p.name.split(".", 1)[1]: (float(low[k] + span[k] * self.fit.unit[k]), float(span[k] * sd[k]), p.unit)
             for k, p in enumerate(self.space)
@@ -93,6 +93,26 @@ def screening_points(
     return np.asarray(points)
 
 
+def responds(objective: Objective, start: FloatArray, base: int) -> bool:
+    """Does anything at all change when every coefficient takes a quarter of its prior range?
+
+    A lag of grippers that never move, say, cannot be seen, and need not be refitted.
+    """
+    strong = start.copy()
+    strong[base:] = np.where(start[base:] < 0.7, start[base:] + 0.25, start[base:] - 0.25)
+    rows = objective.many(np.stack([start, strong]))
+    return not np.array_equal(rows[0], rows[1])
+
+
+def unchanged(plain: Polished, start: FloatArray, response: FloatArray) -> Polished:
+    """The plain fit as the fit of an effect without any ``response (N, coefficients)`` in the data."""
+    extra = len(start) - len(plain.unit)
+    covariance = np.zeros((len(start), len(start)))
+    covariance[: len(plain.unit), : len(plain.unit)] = plain.covariance
+    covariance[len(plain.unit) :, len(plain.unit) :] = np.eye(extra) / 12.0  # of the prior
+    return replace(plain, unit=start, covariance=covariance, jacobian=np.hstack([plain.jacobian, response]))
+
+
 def best_starts(objective: Objective, points: FloatArray) -> list[FloatArray]:
     """``points`` from the smallest residual to the largest."""
     sizes = [float(w @ w) for w in objective.many(points)]
@@ -105,7 +125,7 @@ def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
     The likelihood ratio is scaled by what the candidate itself leaves unexplained, so that a model that
     is wrong anyway does not make every effect significant.
     """
-    scale = max(1.0, candidate.rss / len(candidate.fit.white))
+    scale = max(1.0, candidate.rss / candidate.fit.count)
     drop = max(0.0, rss_without - candidate.rss) / scale
     log_p = stats.chi2.logsf(drop, len(candidate.space) - candidate.base) + np.log(tried)
     if log_p > -1e-3:

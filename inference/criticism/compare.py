@@ -19,7 +19,7 @@ from ..noise import Noise
 from ..residuals import Residual, residual
 
 #: Posterior draws that are simulated for the scatter of predictions.
-PREDICTIVE = 12
+PREDICTIVE = 8
 #: A model is called adequate unless a misfit this large is less probable than that under the noise.
 SIGNIFICANCE = 0.01
 
@@ -136,7 +136,7 @@ def misfit_p_value(white: FloatArray, parameters: int, noise: Noise, rng: np.ran
     Replicates are chi-square with the residual degrees of freedom, times the square of how far the
     true noise may be from its estimate.
     """
-    degrees = max(len(white) - parameters, 1)
+    degrees = max(noise.information * len(white) - parameters, 1.0)
     scale = 1.0 + noise.relative_error * rng.normal(size=20_000)
     replicate = rng.chisquare(degrees, size=20_000) * scale**2
     return float((1 + np.sum(replicate >= white @ white)) / 20_001)

@@ -16,14 +16,16 @@ from ...core.study import Problem, SimulationPool, Study, Task
 from ..fitting import FitResult, load_fit, offsets_of
 from ..polish import Objective, Polished, polish
 from ..residuals import residual
-from .candidate import Candidate, best_starts, effect_start, screening_points, summary
+from .candidate import Candidate, best_starts, effect_start, responds, screening_points, summary, unchanged
 from .sentences import explain
 from .verdict import Decision, Evidence, decide, has_misfit
 
 #: Effects that one diagnosis may name, one after the other.
 MOST_EFFECTS = 2
-#: Least-squares evaluations for a candidate.
-EVALUATIONS = 10
+#: Least-squares evaluations for every candidate, and for the most promising ones on top.
+FIRST_EVALUATIONS, MORE_EVALUATIONS = 4, 10
+#: The candidates that are polished to the end: this many, and all that explain half of what the best does.
+FINALISTS = 2
 
 
 @dataclass(frozen=True)
@@ -120,18 +122,18 @@ class _Work:
             plain = polish(objective, plain, 2)
         candidates = []
         for k, name in enumerate(names):
-            self.study.progress(f"trying {name}", k, len(names))
+            self.study.progress(f"trying {name}", k + 1, len(names))
             candidates.append(self.refit((*effects, name), plain))
-        self.study.progress("candidates tried", len(names), len(names))
+        candidates = self.finish(effects, candidates, plain)
         best = min(candidates, key=lambda c: c.rss)
         if best.rss < plain.rss:
             # the plain model gets the best candidate's start too, or a better start would pass for an effect
-            again = polish(objective, best.fit.unit[: len(objective.space)], EVALUATIONS)
+            again = polish(objective, best.fit.unit[: len(objective.space)], MORE_EVALUATIONS)
             plain = min(plain, again, key=lambda p: p.rss)
         candidates = [replace(c, held_out=self.held_out(c.space, c.fit.unit)) for c in candidates]
         evidence = Evidence(
             rss_plain=plain.rss,
-            count=len(plain.white) - len(objective.space),
+            count=max(plain.count - len(objective.space), 1.0),
             held_out_plain=summary(list(self.held_out(objective.space, plain.unit).values())),
             noise_sd=self.fit.noise.sd,
             noise_error=self.fit.noise.relative_error,
@@ -148,9 +150,26 @@ class _Work:
         if len(effects) == 1:
             starts = np.vstack([starts, self.starts])
         points = screening_points(objective.space, base, starts, self.study.config.diagnose.draws, rng)
-        points = np.vstack([effect_start(objective.space, base, plain.unit), points])
-        first = polish(objective, best_starts(objective, points)[0], EVALUATIONS)
+        start = effect_start(objective.space, base, plain.unit)
+        if not responds(objective, start, base):
+            still = np.zeros((len(plain.white), len(objective.space) - base))
+            return Candidate(effects[-1], objective.space, base, unchanged(plain, start, still))
+        points = np.vstack([start, points])
+        first = polish(objective, best_starts(objective, points)[0], FIRST_EVALUATIONS)
         return Candidate(effects[-1], objective.space, base, first)
+
+    def finish(self, effects: tuple[str, ...], candidates: list[Candidate], plain: Polished) -> list[Candidate]:
+        """Polish the promising candidates to the end; the others are far behind and stay as they are."""
+        order = sorted(candidates, key=lambda c: c.rss)
+        half = (plain.rss + order[0].rss) / 2
+        out = []
+        for k, c in enumerate(order):
+            if k < FINALISTS or c.rss < half:
+                self.study.progress(f"refitting {c.name}", 0, 0)
+                fit = polish(self.objective((*effects, c.name)), c.fit.unit, MORE_EVALUATIONS)
+                c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
+            out.append(c)
+        return out
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
         values = space.as_dict(space.from_unit(unit))
@@ -166,7 +185,7 @@ class _Work:
 
     def fitted_error(self, polished: Polished) -> float:
         """Root mean square on the fitted recordings [unit]."""
-        return float(np.sqrt(polished.rss / len(polished.white)) * self.fit.noise.sd)
+        return float(np.sqrt(polished.rss / polished.count) * self.fit.noise.sd)
 
     def curves(self, first: _Stage, after: Candidate) -> dict[str, dict[str, tuple[Any, list[str], str]]]:
         """Error over time and shape, before and after, for the report."""
@@ -183,9 +202,7 @@ class _Work:
             unit = recording.series.unit
             errors = [
                 np.sqrt(
-                    np.nanmean(
-                        residual(recording, o.series, self.fit.noise, self.offsets).difference ** 2, axis=(1, 2)
-                    )
+                    np.nanmean(residual(recording, o.series, self.fit.noise, self.offsets).difference ** 2, axis=(1, 2))
                 )
                 for o in (before, later)
             ]
@@ -251,7 +268,7 @@ def _result(
         "error": {
             "noise": work.fit.noise.sd,
             "before": before,
-            "after": later if named else before,
+            "after": later if named or first.decision.verdict == "tied" else before,
             "unit": work.fit.noise.unit,
         },
         "simulations": count,

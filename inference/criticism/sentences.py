@@ -8,9 +8,7 @@ from ...core.effect import Effect
 from .verdict import EXPLAINS, Evidence
 
 
-def explain(
-    result: dict[str, Any], effects: dict[str, type[Effect]], evidence: Evidence, held_out: int
-) -> list[str]:
+def explain(result: dict[str, Any], effects: dict[str, type[Effect]], evidence: Evidence, held_out: int) -> list[str]:
     """Paragraphs for people: the verdict first, then what it rests on and what could not be seen."""
     error = result["error"]
     where = "held-out error" if held_out else "error on the fitted recordings"
@@ -27,8 +25,11 @@ def explain(
         )
     elif verdict == "tied":
         out.append(
-            f"Tied: {', '.join(named)} explain the misfit equally well, and these data cannot tell them apart. "
-            "A motion that excites them differently would: faster, at another frequency, or held still."
+            f"Tied: {' and '.join(named)} explain the misfit equally well ("
+            f"{', '.join(_share(result, n) for n in named)} of the excess), and these data cannot tell them apart. "
+            f"With {named[0]}, {where} {length(error['before'], error['unit'])} → "
+            f"{length(error['after'], error['unit'])}, noise {length(error['noise'], error['unit'])}. "
+            "A motion that excites them differently would decide: faster, at another frequency, or held still."
         )
     elif verdict == "none":
         best = result["candidates"][0]
@@ -54,9 +55,14 @@ def explain(
     hidden = [c.name for c in evidence.candidates if not c.visible]
     if hidden:
         out.append(f"Not visible in these data, so neither ruled in nor out: {', '.join(sorted(hidden))}.")
-    if verdict == "named":
+    if verdict in ("named", "tied"):
         out.append(f"Add it with: muslin add {named[0]} STUDY.toml")
     return out
+
+
+def _share(result: dict[str, Any], name: str) -> str:
+    candidate = next(c for c in result["candidates"] if c["name"] == name)
+    return f"{name} {100 * candidate['explained']:.0f} %, {_coefficients(candidate)}"
 
 
 def length(value: float, unit: str) -> str:

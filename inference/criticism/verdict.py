@@ -27,7 +27,7 @@ class Evidence:
 
     Args:
         rss_plain: residual sum of squares of the model as it is [noise variances].
-        count: of residuals.
+        count: of independent residuals.
         held_out_plain: root mean square error on held-out recordings [unit]; NaN if there are none.
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
@@ -35,7 +35,7 @@ class Evidence:
     """
 
     rss_plain: float
-    count: int
+    count: float
     held_out_plain: float
     noise_sd: float
     noise_error: float
@@ -44,11 +44,12 @@ class Evidence:
     @property
     def floor(self) -> float:
         """The residual sum of squares that the noise leaves, or the best candidate if that is less."""
-        return min([float(self.count), *(c.rss for c in self.candidates)])
+        return min([self.count, *(c.rss for c in self.candidates)])
 
     @property
     def excess(self) -> float:
-        return max(self.rss_plain - self.floor, 1e-9)
+        """Misfit to be explained; no less than two margins, below which there is nothing to share out."""
+        return max(self.rss_plain - self.floor, 2 * MARGIN)
 
     def explained(self, candidate: Candidate) -> float:
         """Share of the excess misfit that goes away with the candidate, 0 to 1."""
@@ -78,7 +79,7 @@ class Decision:
 def has_misfit(e: Evidence) -> bool:
     """Is there more misfit than the noise, and its own uncertainty, explain?"""
     allowed = max(NEGLIGIBLE, 6 * e.noise_error + 4 * np.sqrt(2 / e.count))
-    return e.rss_plain / e.count > 1 + allowed
+    return bool(e.rss_plain / e.count > 1 + allowed)
 
 
 def decide(e: Evidence) -> Decision:

@@ -1,195 +1,208 @@
-"""The report, from a synthetic results store: a swinging sheet measured in air and modelled without."""
+"""The report, at every stage a study can be in."""
 
 import re
-from functools import cache
+import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
-import zarr
-
+from made_up_study import ROLES, make_study, takes
 from muslin.cli.report import overview_figure, write_report
-from muslin.core.arrays import FloatArray, IntArray
-from muslin.core.errors import StepMissingError, StoreError
+from muslin.cli.report.words import spread
+from muslin.core.errors import MuslinError, StepMissingError, StoreError
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.series import PointSeries
-from muslin.core.store import new_store, put
-from muslin.core.study.config import parse_config
 from muslin.core.study.study import Study
 
-SIDE, NOISE = 9, 0.003
-ODD = "swing <b>&\"2'"
-ROLES = {"fling": "fit", "swing": "held-out", ODD: "held-out"}
+
+class Page(HTMLParser):
+    """What a page holds: sections, images, addresses, scripts, and its text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.sections: list[str] = []
+        self.figures = {"svg": 0, "img": 0, "canvas": 0, "figure": 0, "details": 0}
+        self.addresses: list[str] = []
+        self.open: list[str] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        table = dict(attrs)
+        if tag == "section":
+            self.sections.append(table["id"] or "")
+        if tag in self.figures:
+            self.figures[tag] += 1
+        self.addresses += [v or "" for k, v in attrs if k in ("src", "href", "xlink:href", "srcset", "action")]
+        if tag in ("section", "script", "style", "figure", "table", "main", "b", "i", "dl", "details"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if self.open and tag in ("section", "script", "style", "figure", "table", "main", "b", "i", "dl", "details"):
+            assert self.open.pop() == tag, f"</{tag}> closes something else"
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts.append(data)
+        elif not self.open or self.open[-1] != "style":
+            self.text += data
 
 
-@cache
-def sheet(kind: str, drag: float) -> FloatArray:
-    """Vertices (T, V, 3) [m] of a hanging sheet under a gripper motion: Verlet steps with edge projection."""
-    n, spacing, dt = SIDE, 0.3 / (SIDE - 1), 0.005
-    grid = np.arange(n * n).reshape(n, n)
-    pairs = [(grid[:, :-1:2], grid[:, 1::2]), (grid[:, 1:-1:2], grid[:, 2::2]), (grid[:-1:2], grid[1::2])]
-    pairs += [(grid[1:-1:2], grid[2::2]), (grid[:-1, :-1], grid[1:, 1:]), (grid[:-1, 1:], grid[1:, :-1])]
-    edges = [(a.ravel(), b.ravel(), spacing * (1 if k < 4 else 2**0.5)) for k, (a, b) in enumerate(pairs)]
-    x = np.stack([(grid % n) * spacing - 0.15, 0.0 * grid, 1.0 - (grid // n) * spacing], -1).reshape(-1, 3).astype(float)
-    x[:, 1] += 0.004 * np.sin(9 * x[:, 0]) * (1.0 - x[:, 2])
-    start, before, held = x.copy(), x.copy(), np.array([0, n - 1])
-    frames = []
-    for k in range(340):
-        t = k * dt
-        if k % 4 == 0:
-            frames.append(x.copy())
-        rate = {"fling": 0.75, "swing": 0.9}.get(kind, 1.1)
-        y = 0.11 * min(1.0, 2 * rate * t) ** 2 * np.sin(2 * np.pi * rate * t)
-        z = 0.12 * np.sin(np.pi * min(t / 0.9, 1.0)) ** 2 if kind == "fling" else 0.0
-        v = (x - before) / dt
-        g = x.reshape(n, n, 3)
-        normal = np.cross(np.gradient(g, axis=0), np.gradient(g, axis=1)).reshape(-1, 3)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-12
-        vn = (v * normal).sum(1, keepdims=True)
-        a = np.array([0, 0, -9.8]) - drag * 3.0 * np.abs(vn) * vn * normal - 0.3 * v
-        before, x = x, x + np.clip(v, -6, 6) * dt + a * dt * dt
-        for _ in range(14):
-            x[held] = start[held] + [0, y, z]
-            for i, j, rest in edges:
-                d = x[j] - x[i]
-                length = np.linalg.norm(d, axis=1, keepdims=True) + 1e-12
-                step = 0.4 * (1 - rest / length) * d
-                np.add.at(x, i, step)
-                np.add.at(x, j, -step)
-    return np.array(frames)
+def page_of(study: Study, after: Study | None = None) -> Page:
+    page = Page(write_report(study, after=after).read_text(encoding="utf-8"))
+    page.text = " ".join(page.text.replace("\u00a0", " ").replace("\u202f", " ").split())
+    return page
 
 
-def triangles() -> IntArray:
-    a = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
-    return np.concatenate([np.stack([a, a + 1, a + SIDE], 1), np.stack([a + 1, a + SIDE + 1, a + SIDE], 1)])
+def test_nothing_fitted_says_so(tmp_path: Path) -> None:
+    with pytest.raises(StepMissingError, match="muslin fit"):
+        write_report(make_study(tmp_path))
+    assert not list(tmp_path.glob("*.html"))
 
 
-def takes(name: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Time (T,), measured, plain and full model (T, V, 3)."""
-    kind = name if name in ("fling", "swing") else "third"
-    truth, plain, full = sheet(kind, 1.2), sheet(kind, 0.0), sheet(kind, 1.1)
-    noise = NOISE * np.random.default_rng(len(name)).standard_normal(truth.shape)
-    measured = truth + noise
-    measured[20:24, 7] = np.nan
-    return np.arange(len(truth)) * 0.02, measured, plain, full
+def test_after_fit_only(tmp_path: Path) -> None:
+    page = page_of(make_study(tmp_path, "fit"))
+    assert page.sections == ["fit", "provenance", "hidden"]
+    assert page.figures["svg"] == 3 + 1  # marginals, pairs
+    assert "has not been checked yet" in page.text
+    assert "muslin compare cloth.toml" in page.text
+    assert "at a bound of its prior" in page.text
 
 
-def rms(a: FloatArray, b: FloatArray, axis: int) -> FloatArray:
-    return np.asarray(np.sqrt(np.nanmean(((a - b) ** 2).sum(-1), axis=axis)))
+def test_after_compare(tmp_path: Path) -> None:
+    page = page_of(make_study(tmp_path, "fit", "compare", hidden=False))
+    assert page.sections == ["object", "error", "recordings", "points", "fit", "provenance"]
+    assert page.figures["img"] == 3 and page.figures["canvas"] == 1
+    assert page.figures["svg"] == 3 + 3 + 3 + 1  # error, points, marginals, pairs
+    assert "does not explain the recordings" in page.text
+    assert "muslin diagnose cloth.toml" in page.text
 
 
-def put_fit(root: zarr.Group, drag: bool = False) -> None:
-    rng = np.random.default_rng(1)
-    names = ["stretch_stiffness", "bending_rigidity", "areal_density"] + drag * ["air-drag.drag_coefficient"]
-    low, high = [100.0, 1e-6, 0.05, 0.0][: len(names)], [5000.0, 1e-3, 0.3, 2.5][: len(names)]
-    z = rng.standard_normal((600, len(names)))
-    cols = [900 * np.exp(0.2 * z[:, 0]), 2e-5 * np.exp(0.5 * z[:, 1] + 0.3 * z[:, 0]), 0.3 - 0.012 * np.abs(z[:, 2])]
-    if drag:
-        cols[2] = 0.16 + 0.012 * z[:, 2]
-        cols.append(1.19 + 0.08 * z[:, 3] + 0.05 * z[:, 2])
-    samples = np.stack(cols, 1)
-    group = root.create_group("fit")
-    put(group, "posterior_samples", samples, ["sample", "parameter"])
-    put(group, "estimate", samples.mean(0), ["parameter"])
-    put(group, "estimate_sd", samples.std(0), ["parameter"])
-    group.attrs.update(
-        finished=True, parameters=names, units=["N/m", "N·m", "kg/m²", "1"][: len(names)], low=low, high=high,
-        scale=["log", "log", "linear", "linear"][: len(names)], seed=7, rounds=2, simulations=240, failed=3,
-        seconds=48.3, engine="mujoco 4.0.0", estimator="bayessim-rkhs", at_bound=[] if drag else ["areal_density"],
-        noise={"sd": NOISE, "ar1": 0.1, "source": "repeats", "unit": "m"},
-    )  # fmt: skip
+def test_after_everything(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    page = page_of(study)
+    assert page.sections == [
+        "object", "error", "recordings", "points", "candidates", "fit", "provenance", "hidden"
+    ]  # fmt: skip
+    assert re.search(
+        r"Air drag is missing .* held-out error falls from \d+ mm to 3\.\d mm \(noise 3\.0 mm\)", page.text
+    )
+    assert "moves too fast through the air in the model" in page.text
+    assert "drag coefficient 1.19 ± 0.09" in page.text
+    assert "240 fit + 352 diagnosis" in page.text
+    assert "neither found nor ruled out: actuator lag" in page.text
+    assert page.text.index("the fit never saw it") > page.text.index("Made by")
+    assert (tmp_path / "cloth.report.html").stat().st_size < 3e6
 
 
-def put_compare(root: zarr.Group, drag: bool = False) -> None:
-    group = root.create_group("compare")
-    rows = []
-    for name, role in ROLES.items():
-        time, measured, plain, full = takes(name)
-        predicted = full if drag else plain
-        error = rms(predicted, measured, 1)
-        worst = rms(predicted, measured, 0)
-        child = group.create_group(name)
-        put(child, "time", time, ["time"], "s")
-        put(child, "error", error, ["time"], "m")
-        put(child, "scatter", 0.002 + 0.2 * error, ["time"], "m")
-        put(child, "point_error", worst, ["point"], "m")
-        for label, data, dim in [("measured", measured, "point"), ("predicted", predicted, "point"),
-                                 ("vertices", predicted, "vertex")]:  # fmt: skip
-            put(child, label, data, ["time", dim, "axis"], "m")
-        put(child, "triangles", triangles(), ["triangle", "corner"])
-        rigid = measured[:1] + (measured[:, :1] - measured[:1, :1])
-        rows.append({
-            "recording": name, "role": role, "rmse": float(np.sqrt((error**2).mean())), "noise": NOISE * 3**0.5,
-            "scatter": 0.004, "baseline": float(np.sqrt(np.nanmean(((rigid - measured) ** 2).sum(-1)))),
-            "default": 1.2 * float(np.sqrt((error**2).mean())), "worst_time": float(time[error.argmax()]),
-            "worst_point": int(worst.argmax()), "unit": "m",
-        })  # fmt: skip
-    group.attrs.update(
-        finished=True, p_value=0.4 if drag else 0.002, adequate=drag, rows=rows,
-        text="The fitted model misses the measurement most where the sheet moves broadside.",
-    )  # fmt: skip
+@pytest.mark.parametrize(
+    ("verdict", "says"),
+    [
+        ("tied", "air drag or viscous damping; these recordings cannot tell which"),
+        ("none", "no candidate explains it"),
+        ("cannot-tell", "cannot show what is missing"),
+        ("no-misfit", "Nothing is seen to be missing"),
+    ],
+)
+def test_other_verdicts_claim_no_fall_of_the_error(tmp_path: Path, verdict: str, says: str) -> None:
+    page = page_of(make_study(tmp_path, "fit", "compare", "diagnose", verdict=verdict))
+    assert says in page.text
+    assert "falls from" not in page.text and "→" not in page.text.split("The object at")[0]
+    assert ("with air drag (candidate)" in page.text) == (verdict != "no-misfit")
 
 
-def put_diagnose(root: zarr.Group, verdict: str = "named") -> None:
-    group = root.create_group("diagnose")
-    held = []
-    for name, role in ROLES.items():
-        time, measured, plain, full = takes(name)
-        before, after = rms(plain, measured, 1), rms(full, measured, 1)
-        held.append((before, after) if role == "held-out" else (before[:0], after[:0]))
-        child = group.create_group(name)
-        put(child, "time", time, ["time"], "s")
-        put(child, "error_before", before, ["time"], "m")
-        put(child, "error_after", after, ["time"], "m")
-        put(child, "predicted_after", full, ["time", "point", "axis"], "m")
-        put(child, "vertices_after", full, ["time", "vertex", "axis"], "m")
-    b, a = (float(np.sqrt((np.concatenate(x) ** 2).mean())) for x in zip(*held, strict=True))
-
-    def candidate(name: str, c: str, mean: float, sd: float, unit: str, explained: float | None, z: float | None,
-                  ident: str) -> dict[str, object]:  # fmt: skip
-        share = explained or 0.0
-        return {"name": name, "coefficients": {c: {"mean": mean, "sd": sd, "unit": unit}}, "explained": explained,
-                "z": z, "held_out_before": b, "held_out_after": b + share * (a - b) if z else None,
-                "identifiability": ident}  # fmt: skip
-
-    effects = {"named": ["air-drag"], "tied": ["air-drag", "viscous-damping"]}.get(verdict, [])
-    result = {
-        "verdict": verdict, "effects": effects, "simulations": 352, "seconds": 71.0, "seed": 7,
-        "candidates": [
-            candidate("air-drag", "drag_coefficient", 1.19, 0.09, "1", 0.94, 21.4, "seen: 71 % of its trace is its own"),
-            candidate("viscous-damping", "rate", 0.8, 0.2, "1/s", 0.52, 9.7, "seen: shares 0.81 with air-drag"),
-            candidate("gravity-tilt", "angle_x", 0.004, 0.01, "rad", 0.03, 0.4, "seen"),
-            candidate("actuator-lag", "time_constant", 0.0, 0.03, "s", None, None, "cannot be seen in these data"),
-        ],
-        "error": {"noise": NOISE * 3**0.5, "before": b, "after": a if verdict in ("named", "tied") else None, "unit": "m"},
-    }  # fmt: skip
-    text = ["The sheet moves too fast in the model where it moves broadside.",
-            "Adding air drag takes away 94 % of the excess."]  # fmt: skip
-    group.attrs.update(finished=True, text=text, result=result)
+def test_a_second_study_is_the_after(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))
+    assert "air drag: drag coefficient" in page.text and "not in the model" in page.text
+    assert "muslin add air-drag cloth.toml -o cloth-with-air-drag.toml" in page.text
+    assert page.figures["svg"] == 3 + 3 + 4 + 1
+    unfinished = make_study(tmp_path, "fit", drag=True)
+    assert "is the refit of the diagnosis" in page_of(study, unfinished).text
 
 
-def make_study(folder: Path, *steps: str, verdict: str = "named", hidden: bool = True, drag: bool = False) -> Study:
-    """A study in ``folder`` whose store holds these steps."""
-    path = folder / ("cloth-with-air-drag.toml" if drag else "cloth.toml")
-    store = folder / "recording.zarr"
-    if not store.exists():
-        label = {"effect": "air-drag", "values": {"drag_coefficient": 1.2, "<i>": [1, 2]}} if hidden else None
-        recordings = [Recording(n, PointSeries(takes(n)[0], takes(n)[1])) for n in ROLES]
-        save_measurement(Measurement(tuple(recordings)), store, hidden=label)
-    table = {
-        "study": {"measurement": "recording.zarr", "hold_out": [n for n, r in ROLES.items() if r != "fit"], "seed": 7},
-        "scenario": {"name": "swing"}, "simulator": {"name": "mujoco"},
-    }  # fmt: skip
-    study = Study(parse_config(table, "test"), path)
-    study.save()
-    with new_store(study.results_path, overwrite=True) as root:
-        root.attrs["kind"] = "results"
-        if "fit" in steps:
-            put_fit(root, drag)
-        if "compare" in steps:
-            put_compare(root, drag)
-        if "diagnose" in steps:
-            put_diagnose(root, verdict)
-    return study
+def test_self_contained_and_escaped(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    html = write_report(study).read_text(encoding="utf-8")
+    page = Page(html)
+    assert all(a.startswith(("data:image/png;base64,", "#")) for a in page.addresses)
+    assert not re.search(r"https?:|@import|url\((?!#)", html)
+    assert "<b>&\"2'" not in html and "swing &lt;b&gt;&amp;&#34;2&#39;" in html
+    assert "<i>" not in html and "&lt;i&gt;" in html
+    assert not page.open
+    ids = re.findall(r' id="([^"]+)"', html)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r"url\(#([^)]+)\)", html)) <= set(ids)
+
+
+def test_survives_lost_measurement_pixels_and_no_meshes(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    (tmp_path / "recording.zarr").rename(tmp_path / "elsewhere.zarr")
+    group = study.results("r+")
+    for name in ROLES:
+        for array in ("vertices", "triangles", "scatter"):
+            del group[f"compare/{name}/{array}"]
+        for array in ("vertices_before", "vertices_after"):
+            del group[f"diagnose/{name}/{array}"]
+    page = page_of(study)
+    assert "hidden" not in page.sections
+    assert page.figures["canvas"] == 0 and page.figures["img"] == 3
+
+
+def test_points_without_correspondence_are_not_paired(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare")
+    series = [Recording(n, PointSeries(takes(n)[0], takes(n)[1], correspondence=False)) for n in ROLES]
+    save_measurement(Measurement(tuple(series)), study.measurement_path, overwrite=True)
+    page = page_of(study)
+    assert "points" not in page.sections and page.figures["img"] == 3
+
+
+def test_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = make_study(tmp_path, "fit")
+    path = write_report(study, tmp_path / "new" / "r.html")
+    first = path.read_text(encoding="utf-8")
+
+    def full(self: Path, target: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(StoreError, match="disk is full"):
+        write_report(study, path)
+    assert path.read_text(encoding="utf-8") == first
+    assert [p.name for p in path.parent.iterdir()] == ["r.html"]
+
+
+def test_missing_matplotlib_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = make_study(tmp_path, "fit")
+    for name in [n for n in sys.modules if n.startswith("muslin.cli.report.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    with pytest.raises(MuslinError, match=r"pip install 'muslin\[report\]'"):
+        write_report(study)
+
+
+def test_overview_picture(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    assert overview_figure(study).startswith(b"\x89PNG")
+    (tmp_path / "b").mkdir()
+    with pytest.raises(StepMissingError, match="muslin compare"):
+        overview_figure(make_study(tmp_path / "b", "fit"))
+
+
+@pytest.mark.parametrize(
+    ("mean", "sd", "unit", "text"),
+    [
+        (1.19, 0.09, "1", "1.19 ± 0.09"),
+        (1.19, 0.11, "1", "1.19 ± 0.11"),
+        (920.4, 180.0, "N/m", "920 ± 180 N/m"),
+        (2.4e-5, 1.6e-5, "N m", "(2.4 ± 1.6) × 10⁻⁵ N m"),
+        (-0.02, 0.003, "rad", "−0.020 ± 0.003 rad"),
+        (3.0, 0.0, "s", "3 s"),
+        (float("nan"), 1.0, "s", "–"),
+    ],
+)
+def test_spread(mean: float, sd: float, unit: str, text: str) -> None:
+    assert spread(mean, sd, unit).replace("\u00a0", " ") == text

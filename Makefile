@@ -1,0 +1,41 @@
+# make demo   sets up everything and does the main job on two recordings
+# make test   sets up everything and passes the tests
+# make lint   ruff and mypy
+# make bench  every benchmark; make bench-NAME one of them
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.ready
+
+.PHONY: demo test lint bench bench-hidden-small clean
+
+$(READY): pyproject.toml constraints.txt
+	@echo "setting up $(VENV) (about a minute, torch as a CPU build)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/pip install --quiet --disable-pip-version-check --upgrade pip 2>/dev/null
+	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]' 2>/dev/null \
+		|| $(BIN)/pip install -c constraints.txt -e '.[all,dev]'
+	@touch $@
+
+demo: $(READY)
+	@$(BIN)/python examples/demo.py
+
+test: $(READY)
+	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	@rm -rf build/types && mkdir -p build/types/muslin
+	@for part in __init__.py py.typed core backends perception inference plugins cli; do \
+		ln -s "$(CURDIR)/$$part" build/types/muslin/$$part; done
+	cd build/types && MYPYPATH=. "$(CURDIR)/$(BIN)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p muslin
+
+bench: bench-hidden-small
+
+bench-hidden-small: $(READY)
+	$(BIN)/python tests/benchmarks/hidden_small.py
+
+clean:
+	rm -rf $(VENV) build *.egg-info demo

@@ -1,0 +1,89 @@
+"""Where the measured points sit on the mesh, as far as the first frame tells."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..core.errors import InputError
+from ..core.measurement import Measurement
+from ..core.scenarios import preset
+from ..core.study import build_problem, parse_config
+from .study_file import Plan, plan_table
+
+_CHOICES = ("all", "bound", "nearest")
+#: A point further than this share of the object's size from the mesh is probably in another frame.
+_FAR = 0.25
+
+
+def parse_markers(text: str) -> str | list[int] | None:
+    """``--markers``: a choice, vertex numbers, or None for what fits."""
+    if not text:
+        return None
+    if text in _CHOICES:
+        return text
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--markers must be {', '.join(_CHOICES)} or vertex numbers with commas between them, but is {text!r}"
+        ) from error
+
+
+def place_markers(plan: Plan, measured: Measurement, where: str) -> tuple[Plan, list[str]]:
+    """The plan with markers that the mesh and the recordings allow, and remarks for the person.
+
+    Points that are as many as vertices sit on the vertices; else a solid carries each where it is in
+    the first frame, and on a cloth each sits on the nearest vertex.
+
+    Args:
+        plan: of the study.
+        measured: the measurement.
+        where: name of the study file, for messages.
+    """
+    if plan.markers is not None and plan.markers != "nearest":
+        return plan, []
+    used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
+    count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
+    base = preset(plan.scenario)
+    vertices = len(base.body(plan.size, plan.vertices).vertices)
+    followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
+    if plan.markers is None and (not followed or count == vertices):
+        return replace(plan, markers="all"), []
+    if plan.markers is None and base.kind == "solid":
+        return replace(plan, markers="bound"), [
+            f"the {count} points are tied to the object where they are in the first frame"
+        ]
+    return _on_nearest(plan, measured, where, count)
+
+
+def _on_nearest(plan: Plan, measured: Measurement, where: str, count: int) -> tuple[Plan, list[str]]:
+    """Every point on the vertex that is nearest in the first frames, over all recordings."""
+    draft = parse_config(plan_table(replace(plan, markers=[0] * count)), where)
+    problem = build_problem(draft, measured)
+    total, seen = 0.0, 0
+    for name, recording in problem.recordings.items():
+        first = recording.series.points[0]
+        if first.shape[1] != 3:
+            raise InputError(f"recording {name!r} has points of 2 coordinates; give --markers with vertex numbers")
+        apart = np.linalg.norm(first[:, None] - problem.scenarios[name].world_vertices()[None], axis=2)
+        total, seen = total + np.nan_to_num(apart), seen + np.isfinite(apart)
+    if not np.all(seen):
+        lost = int(np.argmin(np.all(np.asarray(seen) > 0, axis=1)))
+        raise InputError(
+            f"point {lost} is not seen in the first frame of any recording, so it cannot be placed on the mesh; "
+            "import from a later --start, leave it out with --points, or give --markers with vertex numbers"
+        )
+    distance = np.asarray(total / seen)
+    ids = np.argmin(distance, axis=1)
+    worst = distance[np.arange(count), ids]
+    remarks = [
+        f"the {count} points are placed on their nearest vertices, at most {worst.max():.3g} m away in the first frame"
+    ]
+    if worst.max() > _FAR * max(plan.size):
+        remarks.append(
+            f"warning: point {int(worst.argmax())} is {worst.max():.3g} m from the object at the start; check the "
+            "scenario, the size, --up and the unit, or give --markers"
+        )
+    if len(set(ids.tolist())) < count:
+        remarks.append("warning: several points share a vertex; a finer mesh (--vertices) keeps them apart")
+    return replace(plan, markers=[int(i) for i in ids]), remarks

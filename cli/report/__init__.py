@@ -1,0 +1,46 @@
+"""The report: one self-contained HTML page of everything a study has found."""
+
+from pathlib import Path
+
+from ...core.errors import MuslinError
+from ...core.study.study import Study
+
+__all__ = ["overview_figure", "write_report"]
+
+
+def write_report(study: Study, output: Path | None = None, after: Study | None = None) -> Path:
+    """Write the report of a study as far as it has come: after fit, after compare, or after diagnose.
+
+    Args:
+        study: at least fitted.
+        output: HTML file; default ``STEM.report.html`` beside the study file.
+        after: the same study with an effect added, whose errors are then shown as "after".
+
+    Returns:
+        Where the report is.
+
+    Raises:
+        StepMissingError: the study has not been fitted.
+    """
+    try:
+        from .page import render, write_page
+    except ImportError as error:
+        raise _missing(error) from error
+    path = output or study.path.with_name(f"{study.path.stem}.report.html")
+    write_page(render(study, after), path)
+    return path
+
+
+def overview_figure(study: Study, after: Study | None = None) -> bytes:
+    """One wide PNG of a compared study: error over time, and the object at its worst moment."""
+    try:
+        from .overview import draw_overview
+    except ImportError as error:
+        raise _missing(error) from error
+    return draw_overview(study, after)
+
+
+def _missing(error: ImportError) -> Exception:
+    if (error.name or "").split(".")[0] in ("matplotlib", "mpl_toolkits", "jinja2"):
+        return MuslinError(f"a report needs {error.name}; install it with: pip install 'muslin[report]'")
+    return error

@@ -1,0 +1,120 @@
+"""``muslin new``: a study file that a person can read and change."""
+
+import os
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+import typer
+
+from ..core.errors import InputError
+from ..core.measurement import Measurement
+from ..core.measurement_store import load_measurement
+from ..core.registry import REGISTRY
+from ..core.scenarios import PRESETS, preset
+from ..core.study import build_problem, parse_config
+from .console import next_step, say
+from .output import check_output, write_whole
+from .placing import parse_markers, place_markers
+from .study_file import Plan, study_text
+
+Number = TypeVar("Number", int, float)
+
+
+def add_to(app: typer.Typer) -> None:
+    """Add the commands of this file."""
+    app.command("new")(new)
+
+
+def new(
+    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file to write.")],
+    measurement: Annotated[
+        Path, typer.Option(metavar="RECORDING.zarr", help="The measurement, made with muslin import.")
+    ],
+    scenario: Annotated[
+        str, typer.Option(metavar="NAME", help=f"The object and how it is held: {', '.join(PRESETS)}.")
+    ],
+    simulator: Annotated[str, typer.Option(metavar="NAME", help="The engine; muslin plugins lists them.")] = "mujoco",
+    estimator: Annotated[
+        str, typer.Option(metavar="NAME", help="The posterior estimator; muslin plugins lists them.")
+    ] = "bayessim-rkhs",
+    fit_on: Annotated[
+        str, typer.Option(metavar="A,B", help="Recordings that the fit sees; default all that are not held out.")
+    ] = "",
+    hold_out: Annotated[
+        str, typer.Option(metavar="C", help="Recordings kept back, on which every claim is checked; default none.")
+    ] = "",
+    size: Annotated[
+        str, typer.Option(metavar="W,H", help="Size of the object in m: width, height of a cloth; x, y, z of a solid.")
+    ] = "",
+    vertices: Annotated[
+        str, typer.Option(metavar="N,M", help="Vertices of its mesh along the same axes: more are finer and slower.")
+    ] = "",
+    points: Annotated[str, typer.Option(metavar="I,J", help="Measured points to compare, from 0; default all.")] = "",
+    markers: Annotated[
+        str,
+        typer.Option(
+            metavar="all|bound|nearest|I,J",
+            help="Where the points sit on the mesh: on every vertex in order, tied rigidly to where they are in the "
+            "first frame, on the vertex nearest to that, or on these vertices; default what fits.",
+        ),
+    ] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace a study file that is there already.")] = False,
+) -> None:
+    """Write a study file: what is fitted, on what, with which priors. Read it and change what you know better."""
+    base = preset(scenario)
+    for kind, name in (("simulator", simulator), ("estimator", estimator)):
+        if name not in REGISTRY.names(kind):
+            REGISTRY.get(kind, name)  # says what is installed, and which is nearest
+    check_output(study, force)
+    if measurement.suffix in (".npz", ".csv", ".c3d") and measurement.is_file():
+        raise InputError(
+            f"{measurement} is not a measurement; first: muslin import {measurement} -o {measurement.stem}.zarr"
+        )
+    measured = load_measurement(measurement)
+    held = _names(hold_out, measured, "--hold-out")
+    fitted = _names(fit_on, measured, "--fit-on") or [n for n in measured.names if n not in held]
+    if not fitted:
+        raise InputError("--hold-out names every recording, so nothing is left to fit on; leave one out")
+    plan = Plan(
+        measurement=Path(os.path.relpath(measurement.absolute(), study.absolute().parent)).as_posix(),
+        fit_on=fitted,
+        hold_out=held,
+        scenario=scenario,
+        simulator=simulator,
+        estimator=estimator,
+        size=_numbers(size, float, "--size") or list(base.size),
+        vertices=_numbers(vertices, int, "--vertices") or list(base.vertices),
+        points=_numbers(points, int, "--points") or None,
+        markers=parse_markers(markers),
+    )
+    plan, remarks = place_markers(plan, measured, str(study))
+    text = study_text(plan)
+    build_problem(parse_config(tomllib.loads(text), str(study)), measured)
+    write_whole(study, text)
+    say(f"wrote {study}: fits {base.kind} {scenario!r} on {', '.join(fitted)}")
+    if held:
+        say(f"  held out: {', '.join(held)}")
+    for remark in remarks:
+        say(f"  {remark}")
+    next_step(f"look through {study}, then: muslin fit {study}")
+
+
+def _names(text: str, measured: Measurement, option: str) -> list[str]:
+    names = [n.strip() for n in text.split(",") if n.strip()]
+    for name in names:
+        try:
+            measured[name]
+        except InputError as error:
+            raise InputError(f"{option}: {error}") from error
+        if names.count(name) > 1:
+            raise InputError(f"{option} names {name!r} twice")
+    return names
+
+
+def _numbers(text: str, kind: Callable[[str], Number], option: str) -> list[Number]:
+    try:
+        return [kind(part) for part in text.split(",")] if text.strip() else []
+    except ValueError as error:
+        raise InputError(f"{option} must be numbers with commas between them, but is {text!r}") from error

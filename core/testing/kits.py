@@ -1,0 +1,36 @@
+"""The kits by kind of plugin, as ``muslin check`` runs them."""
+
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import Any
+
+from .checks import Check, run_all
+from .effects import effect_checks
+from .extractors import extractor_checks
+from .simulators import simulator_checks
+
+
+def _estimator_checks(estimator: Any) -> list[Check]:
+    from .estimators import check_estimator
+
+    return [Check("keeps what an estimator promises", lambda: check_estimator(estimator))]
+
+
+#: Kind -> the checks of one plugin of that kind.
+KITS: dict[str, Callable[[Any], list[Check]]] = {
+    "simulator": simulator_checks,
+    "extractor": extractor_checks,
+    "effect": effect_checks,
+}
+if find_spec("muslin.core.testing.estimators") is not None:
+    KITS["estimator"] = _estimator_checks
+
+
+def run_checks(kind: str, plugin: Any) -> Iterator[tuple[str, str | None]]:
+    """Title and complaint of every check of a plugin, the complaint None where it passed."""
+    try:
+        checks = KITS[kind](plugin)
+    except Exception as error:  # a plugin that cannot even be built has failed its first check
+        yield "can be built without options", f"{type(error).__name__}: {error}"
+        return
+    yield from run_all(checks)

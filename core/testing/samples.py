@@ -1,0 +1,76 @@
+"""Small objects that the kits try plugins on: a soft sheet and a soft block."""
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..body import Body, cloth_grid, solid_box
+from ..material import ClothMaterial, Material, SolidMaterial
+from ..motion import Motion
+from ..scenario import STANDARD_GRAVITY, Scenario
+from ..scene import Scene
+
+KINDS = ("cloth", "solid")
+
+
+def sample_body(kind: str) -> Body:
+    """A sheet of 12 x 9 cm or a block of 6 x 6 x 6 cm, tilted so that no axis is special."""
+    body = cloth_grid(0.12, 0.09, 4, 3) if kind == "cloth" else solid_box(np.zeros(3), np.full(3, 0.06), (3, 3, 3))
+    cos, sin = np.cos(0.3), np.sin(0.3)
+    tilt = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
+    return Body(body.kind, body.vertices @ tilt.T + np.array([0.0, 0.0, 1.0]), body.elements, body.grid)
+
+
+def sample_material(kind: str) -> Material:
+    """Soft, so that explicit engines stay stable at ordinary steps."""
+    if kind == "cloth":
+        return ClothMaterial(areal_density=0.2, stretch_stiffness=60.0, bending_rigidity=1e-5)
+    return SolidMaterial(density=1000.0, youngs_modulus=3e4)
+
+
+def sample_grasp(body: Body) -> IntArray:
+    """The two top corners of the sheet, the lowest face along y of the block."""
+    if body.kind == "cloth":
+        return np.array([0, 3], np.int64)
+    return np.arange(0, 27).reshape(3, 3, 3)[:, 0].ravel().astype(np.int64)
+
+
+def sample_scene(
+    kind: str,
+    *,
+    held: bool = False,
+    gravity: FloatArray | None = None,
+    table_height: float | None = None,
+    load: float = 0.0,
+) -> Scene:
+    """A scene at rest.
+
+    Args:
+        kind: ``"cloth"`` or ``"solid"``.
+        held: hold :func:`sample_grasp`.
+        gravity: ``(3,)`` [m/s2]; default straight down.
+        table_height: [m] or None.
+        load: mass hung on the last vertex [kg].
+    """
+    body = sample_body(kind)
+    loads = np.zeros(len(body.vertices))
+    loads[-1] = load
+    down = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if gravity is None else gravity
+    ids = sample_grasp(body) if held else np.zeros(0, np.int64)
+    return Scene(body, sample_material(kind), down, ids, loads, table_height)
+
+
+def sample_scenario(kind: str, duration: float = 0.3) -> Scenario:
+    """The held object carried to and fro for ``duration`` [s], every vertex a marker."""
+    body = sample_body(kind)
+    clock = np.linspace(0.0, duration, 31)
+    phase = np.pi * clock / duration
+    path = np.stack([0.03 * np.sin(phase) ** 2, 0.08 * np.sin(phase) ** 2, 0.0 * clock], axis=1)
+    return Scenario(
+        name=f"conformance {kind}",
+        body=body,
+        grasps=(sample_grasp(body),),
+        motion=Motion.from_positions(clock, path[:, None]),
+        times=np.linspace(0.0, duration, 16),
+        markers=np.eye(len(body.vertices)),
+        load_vertices=np.zeros(0, np.int64),
+    )

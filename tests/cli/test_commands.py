@@ -1,0 +1,252 @@
+"""Commands in this process, with steps that stand in for the real ones."""
+
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from muslin.cli.console import ProgressView
+from muslin.cli.failure import BAD_INPUT, INTERNAL, describe
+from muslin.cli.main import run
+from muslin.core.errors import InputError
+from muslin.core.measurement_store import load_measurement, save_measurement
+from muslin.core.registry import REGISTRY
+from muslin.core.study import Study, build_problem, read_config
+from running import Muslin, cloth_measurement
+
+
+class Result:
+    def __init__(self, table: dict[str, Any]) -> None:
+        self.table = table
+
+    def text(self) -> str:
+        return "what a person reads"
+
+    def to_json(self) -> dict[str, Any]:
+        return self.table
+
+
+def status(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as caught:
+        run(arguments)
+    return int(caught.value.code or 0)
+
+
+@pytest.fixture
+def step(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[[Study], Any]], None]:
+    return lambda name, work: monkeypatch.setitem(REGISTRY._objects, ("step", name), work)
+
+
+def test_every_step_says_what_it_found_and_what_is_next(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, following in (("fit", "muslin compare"), ("compare", "muslin diagnose")):
+        step(name, lambda s: Result({}))
+        assert status(name, str(study)) == 0
+        out = capsys.readouterr().out
+        assert "what a person reads" in out and f"next: {following} {study}" in out
+
+
+def test_workers_and_progress_reach_the_study(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def work(s: Study) -> Result:
+        s.progress(f"simulating with {s.workers}", 1, 4)
+        return Result({})
+
+    step("fit", work)
+    assert status("fit", str(study), "--workers", "3") == 0
+    assert "simulating with 3: 1 of 4" in capsys.readouterr().err
+
+
+def test_diagnose_writes_json_and_names_the_command_to_add(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    step("diagnose", lambda s: Result({"verdict": "named", "effects": ["wind"], "error": {"after": float("nan")}}))
+    target = study.parent / "v.json"
+    assert status("diagnose", str(study), "--json", str(target)) == 0
+    assert json.loads(target.read_text())["error"]["after"] is None
+    assert "muslin add wind" in capsys.readouterr().out
+    step("diagnose", lambda s: Result({"verdict": "no-misfit", "effects": []}))
+    assert status("diagnose", str(study)) == 0
+    assert "muslin add" not in capsys.readouterr().out
+
+
+def test_a_missing_folder_is_told_before_anything_is_simulated(step: Callable[..., None], study: Path) -> None:
+    ran: list[Study] = []
+    step("diagnose", ran.append)
+    assert status("diagnose", str(study), "--json", str(study.parent / "no" / "v.json")) == 2
+    assert ran == []
+
+
+def test_an_interrupted_fit_says_that_it_goes_on(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(s: Study) -> Result:
+        raise KeyboardInterrupt
+
+    step("fit", interrupted)
+    assert status("fit", str(study)) == 130
+    err = capsys.readouterr().err
+    assert "run the same command to go on" in err and len(err.splitlines()) == 1
+
+
+def test_an_error_behind_an_error_is_the_one_told(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(s: Study) -> Result:
+        try:
+            raise InputError("the real reason")
+        except InputError as error:
+            raise RuntimeError("a worker failed") from error
+
+    step("fit", fails)
+    assert status("fit", str(study)) == 2
+    assert capsys.readouterr().err == "muslin: error: the real reason\n"
+    step("fit", lambda s: [][0])
+    assert status("fit", str(study)) == INTERNAL
+    err = capsys.readouterr().err
+    assert "IndexError" in err and "--debug" in err and len(err.splitlines()) == 1
+
+
+def test_what_the_operating_system_says() -> None:
+    full = OSError(28, "No space left on device", "results.zarr")
+    assert describe(full) == (
+        "the disk is full (results.zarr); free some space and run the same command again",
+        BAD_INPUT,
+    )
+    assert describe(PermissionError(13, "Permission denied", "s.toml"))[0] == "Permission denied (s.toml)"
+    assert describe(MemoryError())[1] == BAD_INPUT
+
+
+def test_add_writes_a_study_with_the_effect(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    second = study.with_name("study2.toml")
+    assert status("add", "air-drag", str(study), "-o", str(second)) == 0
+    assert read_config(second).effects == {"air-drag": {}}
+    assert f"next: muslin fit {second}" in capsys.readouterr().out
+    assert status("add", "air-drag", str(study), "-o", str(second)) == 2
+    assert status("add", "air-drag", str(study), "-o", str(second), "--force") == 0
+    assert status("add", "air-drag", str(second)) == 2
+
+
+def test_import_of_several_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("a", "b"):
+        np.savez(tmp_path / f"{name}.npz", time=np.arange(5) * 0.1, points=np.random.default_rng(0).random((5, 2, 3)))
+    files = [str(tmp_path / f"{n}.npz") for n in ("a", "b")]
+    out = str(tmp_path / "m.zarr")
+    assert status("import", *files, "-o", out, "--load", "0", "--load", "0.052", "--motion", "release") == 0
+    got = load_measurement(tmp_path / "m.zarr")
+    assert [(r.name, r.load, r.motion) for r in got.recordings] == [("a", 0.0, "release"), ("b", 0.052, "release")]
+    assert "next: muslin new" in capsys.readouterr().out
+    assert status("import", *files, "-o", out, "--force", "--load", "0", "--load", "1", "--load", "2") == 2
+    assert "--load is given 3 times for 2 files" in capsys.readouterr().err
+    assert status("import", *files, "-o", out, "--force", "--name", "x") == 2
+    assert load_measurement(tmp_path / "m.zarr").names == ["a", "b"]
+
+
+@pytest.mark.parametrize("arguments", [(), ("--vertices", "5,5")])
+def test_new_writes_a_study_that_can_be_built(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    measured = cloth_measurement()
+    (tmp_path / "data").mkdir()
+    save_measurement(measured, tmp_path / "data" / "m.zarr")
+    path = tmp_path / "study.toml"
+    given = ("--measurement", str(tmp_path / "data" / "m.zarr"), "--scenario", "fling", "--hold-out", "two")
+    assert status("new", str(path), *given, *arguments) == 0
+    config = read_config(path)
+    assert config.study.measurement == "data/m.zarr"
+    assert config.study.fit_on == ["one"] and config.study.hold_out == ["two"]
+    problem = build_problem(config, measured)
+    assert problem.space.names == ("stretch_stiffness", "bending_rigidity")
+    scenario = problem.scenarios["one"]
+    placed = scenario.markers @ scenario.world_vertices()
+    # 3 mm of noise, and the nearest vertex is the one each marker was made on
+    assert np.abs(placed - measured["one"].series.points[0]).max() < 0.02
+    text = path.read_text()
+    assert "[N/m]" in text or 'unit = "N/m"' in text
+    assert "# drag_coefficient = 1.2" in text
+
+
+def test_every_commented_line_of_a_new_study_is_right(tmp_path: Path) -> None:
+    """Taking the # off the keys that are off by default leaves a study that can still be built."""
+    measured = cloth_measurement((9, 9))
+    save_measurement(measured, tmp_path / "m.zarr")
+    path = tmp_path / "study.toml"
+    assert status("new", str(path), "--measurement", str(tmp_path / "m.zarr"), "--scenario", "fling") == 0
+    lines = []
+    for line in path.read_text().splitlines():
+        bare = line.removeprefix("# ")
+        key = bare.split(" ")[0]
+        takes = line.startswith("# [") or (line.startswith("# ") and " = " in bare and key.replace("_", "").isalpha())
+        lines.append(bare if takes and key != "points" else line)
+    path.write_text("\n".join(lines))
+    config = read_config(path)
+    assert config.noise.sd == 0.003 and config.scenario.table_height == 0.0
+    problem = build_problem(config, measured)
+    assert "scale" in problem.space.names and "air-drag.drag_coefficient" in problem.fixed
+
+
+def test_new_refuses_what_cannot_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save_measurement(cloth_measurement(), tmp_path / "m.zarr")
+    base = ("new", str(tmp_path / "s.toml"), "--measurement", str(tmp_path / "m.zarr"), "--scenario")
+    for arguments, words in (
+        (("flign",), "Did you mean 'fling'"),
+        (("fling", "--hold-out", "three"), "it has one, two"),
+        (("fling", "--fit-on", "one", "--hold-out", "one"), "both fitted on and held out"),
+        (("fling", "--hold-out", "one,two"), "nothing is left to fit on"),
+        (("fling", "--size", "big"), "--size must be numbers"),
+        (("fling", "--markers", "somewhere"), "--markers must be"),
+        (("fling", "--markers", "1,2"), "names 2 vertices"),
+        (("beam",), "cannot be tied"),
+    ):
+        assert status(*base, *arguments) == 2
+        assert words in capsys.readouterr().err
+    assert not (tmp_path / "s.toml").exists()
+
+
+def test_plugins_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("plugins", "--json") == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert {"kind": "effect", "name": "wind"}.items() <= next(r for r in rows if r["name"] == "wind").items()
+
+
+def test_check_passes_and_fails(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    assert status("check", "wind") == 0
+    assert "0 failed" in capsys.readouterr().out
+    monkeypatch.setitem(REGISTRY._objects, ("extractor", "hollow"), dict)
+    assert status("check", "hollow") == 1
+    assert "FAIL" in capsys.readouterr().out
+    assert status("check", "fit") == 2
+    assert "no conformance kit" in capsys.readouterr().err
+
+
+def test_progress_without_a_terminal_is_a_line_every_few_seconds() -> None:
+    stream = io.StringIO()
+    with ProgressView(stream) as progress:
+        for k in range(1000):
+            progress("simulating [1]", k + 1, 1000)
+    assert stream.getvalue() == "simulating [1]: 1 of 1000\n"
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    stream = Terminal()
+    with ProgressView(stream) as progress:
+        progress("simulating [1]", 3, 10)
+        progress("training", 0, 0)
+    assert "simulating [1]" in stream.getvalue() and "training" in stream.getvalue()
+
+
+def test_help_and_version(muslin: Muslin) -> None:
+    done = muslin("--version")
+    assert done.returncode == 0 and done.stdout.startswith("muslin ")
+    for command in ("import", "new", "fit", "compare", "diagnose", "add", "report", "plugins", "check"):
+        assert command in muslin().stdout
+    assert "in kg" in muslin("import", "--help").stdout

@@ -1,0 +1,137 @@
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from muslin.core.errors import InputError, MissingFileError, MuslinError
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.registry import REGISTRY
+from muslin.core.scenarios import preset
+from muslin.core.series import PointSeries
+from muslin.core.study import build_problem, parse_config, read_config, write_config
+from muslin.core.testing.reference import ReferenceSimulator
+
+
+@pytest.fixture(autouse=True)
+def reference_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(REGISTRY._objects, ("simulator", "reference"), ReferenceSimulator)
+
+
+def table(**changes: Any) -> dict[str, Any]:
+    base: dict[str, Any] = {
+        "study": {"measurement": "m.zarr"},
+        "scenario": {"name": "fling", "vertices": [3, 3]},
+        "simulator": {"name": "reference"},
+    }
+    for place, value in changes.items():
+        head, _, tail = place.partition("__")
+        if tail:
+            base.setdefault(head, {})[tail] = value
+        else:
+            base[head] = value
+    return base
+
+
+def measurement(points: int = 9, unit: str = "m") -> Measurement:
+    body = preset("fling").body(vertices=[3, 3])
+    axes = 2 if unit == "px" else 3
+    seen = np.tile((body.vertices + np.array([0, 0, 1.0]))[:points, :axes], (4, 1, 1))
+    series = PointSeries(np.linspace(0, 0.1, 4), seen, unit)  # type: ignore[arg-type]
+    return Measurement((Recording("a", series), Recording("b", series)))
+
+
+def complaint(**changes: Any) -> str:
+    with pytest.raises(MuslinError) as caught:
+        build_problem(parse_config(table(**changes), "study.toml"), measurement())
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_plain_study_can_be_built() -> None:
+    problem = build_problem(parse_config(table(), "s"), measurement())
+    assert problem.fit_on == ("a", "b")
+    assert problem.space.names == ("stretch_stiffness", "bending_rigidity")
+
+
+def test_unknown_keys_name_the_nearest() -> None:
+    assert "Did you mean 'vertices'" in complaint(scenario__vertexes=[3, 3])
+    assert "Did you mean 'simulator'" in complaint(simulater={"name": "x"})
+    assert "Did you mean 'low'" in complaint(parameters={"friction": {"lo": 0.1, "high": 1.0}})
+
+
+def test_values_of_the_wrong_kind() -> None:
+    assert "[study.measurement] is missing" in complaint(study={})
+    assert "[estimator.draws]" in complaint(estimator={"name": "x", "draws": 1})
+    assert "[noise.sd]" in complaint(noise={"sd": -1.0})
+
+
+def test_recordings() -> None:
+    both = complaint(study__fit_on=["a"], study__hold_out=["a"])
+    assert "recording a is both fitted on and held out" in both
+    assert "no recording 'c'" in complaint(study__hold_out=["c"])
+    assert "nothing is left to fit on" in complaint(study__hold_out=["a", "b"])
+
+
+def test_units_and_bounds_of_parameters() -> None:
+    wrong = complaint(parameters={"stretch_stiffness": {"low": 1.0, "high": 2.0, "unit": "Pa"}})
+    assert "unit is 'Pa', but stretch_stiffness is in 'N/m'" in wrong
+    assert "Did you mean 'friction'" in complaint(parameters={"fricton": {"low": 0.0, "high": 1.0}})
+    assert "low must be below high" in complaint(parameters={"friction": {"low": 1.0, "high": 0.0}})
+    assert "has no 'youngs_modulus'" in complaint(material={"youngs_modulus": 1e5})
+
+
+def test_effects() -> None:
+    assert "Did you mean 'wind'" in complaint(effects={"wnd": {}})
+    assert "[effects.wind] has no 'speed'" in complaint(effects={"wind": {"speed": 1.0}})
+    config = parse_config(table(effects={"air-drag": {"drag_coefficient": 1.2}}), "s")
+    problem = build_problem(config, measurement())
+    assert problem.fixed == {"air-drag.drag_coefficient": 1.2}
+    assert problem.space.names[-1] == "air-drag.lift_coefficient"
+
+
+def test_what_the_mesh_does_not_have() -> None:
+    assert "takes vertex 99, but the mesh has vertices 0 to 8" in complaint(scenario__grasps=[[0, 99]])
+    assert "vertex 44" in complaint(scenario__markers=[0, 1, 2, 3, 4, 5, 6, 7, 44])
+    assert "has points 0 to 8, there is no 9" in complaint(scenario__points=[9])
+    assert "names 2 vertices" in complaint(scenario__markers=[0, 1])
+
+
+def test_plugins_and_their_options() -> None:
+    assert "Did you mean 'reference'" in complaint(simulator={"name": "refernce"})
+    assert "does not take these options" in complaint(simulator={"name": "reference", "colour": "red"})
+
+
+def test_points_that_cannot_be_compared() -> None:
+    config = parse_config(table(), "s")
+    with pytest.raises(InputError, match="in pixels"):
+        build_problem(config, measurement(unit="px"))
+    with pytest.raises(InputError, match="5 points, the mesh 9 vertices"):
+        build_problem(config, measurement(points=5))
+    flat = PointSeries(np.array([0.0, 1.0]), np.ones((2, 9, 2)))
+    with pytest.raises(InputError, match="comparing needs x, y and z"):
+        build_problem(config, Measurement((Recording("a", flat),)))
+
+
+def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match="muslin new"):
+        read_config(tmp_path / "nix.toml")
+    with pytest.raises(InputError, match="is a folder"):
+        read_config(tmp_path)
+    for content in (b"[study\n", b"\xff\xfe\x00"):
+        (tmp_path / "s.toml").write_bytes(content)
+        with pytest.raises(InputError, match="not valid TOML"):
+            read_config(tmp_path / "s.toml")
+
+
+def test_a_study_file_survives_writing(tmp_path: Path) -> None:
+    config = parse_config(table(effects={"wind": {}}, noise={"sd": 0.003}, estimator={"name": "x", "width": 7}), "s")
+    write_config(config, tmp_path / "s.toml")
+    again = read_config(tmp_path / "s.toml")
+    assert again == config
+    assert again.estimator.options == {"width": 7}
+    assert tomllib.loads((tmp_path / "s.toml").read_text())["effects"] == {"wind": {}}
+    assert [p.name for p in tmp_path.iterdir()] == ["s.toml"]
+    with pytest.raises(MuslinError, match="cannot write"):
+        write_config(config, tmp_path / "no folder" / "s.toml")
