@@ -144,4 +144,4 @@ def _z(z: object) -> str:
     known = number(z)
     if known is not None:
         return f"{known:.1f}".replace("-", "−") if abs(known) < 100 else f"{known:.0f}"
-    return "–" if z is None else "> 37" if str(z).lower() in ("inf", "infinity") else "–"
+    return "–" if z is None else ">\u00a037" if str(z).lower() in ("inf", "infinity") else "–"

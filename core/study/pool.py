@@ -2,9 +2,9 @@
 
 import contextlib
 import os
+import signal
 import threading
 import time
-import signal
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool

@@ -1,0 +1,13 @@
+"""Fixtures of the inference tests."""
+
+from pathlib import Path
+
+import pytest
+from muslin.core.study import Study
+from small import small_measurement, write_study
+
+
+@pytest.fixture
+def small_study(tmp_path: Path) -> Study:
+    pytest.importorskip("mujoco")
+    return Study.load(write_study(tmp_path, small_measurement()), workers=1)

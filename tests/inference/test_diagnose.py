@@ -1,0 +1,89 @@
+"""Diagnosis end to end on small studies, on both engines."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from muslin.core.errors import InputError
+from muslin.core.study import Study
+from muslin.inference.criticism.diagnose import Diagnosis
+from muslin.plugins.effects.air import AirDrag
+from small import small_measurement, write_study
+
+pytest.importorskip("mujoco")
+
+SCHEMA = {"verdict", "effects", "candidates", "error", "simulations", "seconds", "seed"}
+CANDIDATE = {"name", "coefficients", "explained", "z", "held_out_before", "held_out_after", "identifiability"}
+
+
+def check_schema(result: dict[str, object]) -> None:
+    assert set(result) == SCHEMA
+    assert set(result["error"]) == {"noise", "before", "after", "unit"}  # type: ignore[call-overload]
+    for c in result["candidates"]:  # type: ignore[attr-defined]
+        assert set(c) == CANDIDATE
+        assert all(set(v) == {"mean", "sd", "unit"} for v in c["coefficients"].values())
+    json.loads(json.dumps(result, allow_nan=False))
+
+
+@pytest.mark.slow
+def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(tmp_path: Path) -> None:
+    path = write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2)))
+    study = Study.load(path)
+    study.fit()
+    assert not study.compare().adequate
+    diagnosis: Diagnosis = study.diagnose()
+    check_schema(diagnosis.result)
+    assert diagnosis.result["verdict"] == "named"
+    assert diagnosis.result["effects"] == ["air-drag"]
+    drag = diagnosis.result["candidates"][0]["coefficients"]["drag_coefficient"]
+    assert abs(drag["mean"] - 1.2) < 4 * drag["sd"] + 0.02
+    assert diagnosis.result["error"]["after"] < 0.5 * diagnosis.result["error"]["before"]
+    added = study.add("air-drag")
+    added.fit()
+    rows = {r.recording: r for r in added.compare().rows}
+    assert rows["other"].role == "held-out"
+    assert rows["other"].rmse < 1.15 * rows["other"].noise
+
+
+@pytest.mark.slow
+def test_nothing_is_named_where_nothing_is_missing(small_study: Study) -> None:
+    small_study.fit()
+    result = small_study.diagnose().result
+    check_schema(result)
+    assert result["verdict"] in ("no-misfit", "cannot-tell")
+    assert result["effects"] == []
+    assert result["error"]["after"] == result["error"]["before"]
+
+
+@pytest.mark.slow
+def test_the_same_study_runs_on_the_other_engine_by_changing_one_word(tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    path = write_study(tmp_path, small_measurement())
+    text = path.read_text()
+    assert text.count('"mujoco"') == 1
+    path.write_text(text.replace('"mujoco"', '"pybullet"').replace("time_step = 0.01", "time_step = 0.005"))
+    study = Study.load(path)
+    study.fit()
+    row = study.compare().rows[0]
+    assert np.isfinite(row.rmse)
+    assert row.rmse < row.baseline
+
+
+def test_candidates_are_the_installed_effects_that_are_not_in_yet(small_study: Study) -> None:
+    from muslin.inference.criticism.diagnose import candidate_names
+
+    names = candidate_names(small_study)
+    assert {"air-drag", "wind", "viscous-damping", "internal-damping", "gravity-tilt", "actuator-lag"} <= set(names)
+    small_study.config.effects["wind"] = {}
+    assert "wind" not in candidate_names(small_study)
+    small_study.config.diagnose.candidates = ["wind"]
+    with pytest.raises(InputError, match="no candidate"):
+        candidate_names(small_study)
+
+
+def test_add_writes_a_study_with_the_effect_inferred(small_study: Study) -> None:
+    added = Study.load(small_study.add("air-drag").path)
+    assert "air-drag.drag_coefficient" in added.problem.space.names
+    with pytest.raises(InputError, match="already"):
+        added.add("air-drag")

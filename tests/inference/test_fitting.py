@@ -1,0 +1,113 @@
+"""The fit: right where the model is right, continues after a kill, does not depend on the workers."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from muslin.core.errors import StepMissingError
+from muslin.core.store import read
+from muslin.core.study import Study
+from small import TRUTH, small_measurement, write_study
+
+pytest.importorskip("mujoco")
+
+
+def test_a_right_model_is_fitted_within_its_uncertainty(small_study: Study) -> None:
+    result = small_study.fit()
+    truth = np.array([TRUTH.stretch_stiffness, TRUTH.bending_rigidity])
+    assert result.names == ("stretch_stiffness", "bending_rigidity")
+    assert np.all(np.abs(result.estimate - truth) < 4 * result.sd), (result.estimate, result.sd)
+    assert abs(result.noise.sd - 0.001) < 0.0002
+    assert result.failed == 0
+    comparison = small_study.compare()
+    assert comparison.adequate, comparison.text()
+    assert all(row.rmse < row.baseline for row in comparison.rows)
+
+
+def test_a_finished_fit_is_returned_and_not_run_again(small_study: Study) -> None:
+    first = small_study.fit()
+    began = time.monotonic()
+    again = Study.load(small_study.path, workers=1).fit()
+    assert time.monotonic() - began < 1.0
+    np.testing.assert_array_equal(first.samples, again.samples)
+
+
+def test_one_and_two_workers_give_the_same_posterior(tmp_path: Path) -> None:
+    measurement = small_measurement()
+    results = []
+    for workers in (1, 2):
+        path = write_study(tmp_path / str(workers), measurement)
+        results.append(Study.load(path, workers=workers).fit())
+    np.testing.assert_array_equal(results[0].samples, results[1].samples)
+    np.testing.assert_array_equal(results[0].estimate, results[1].estimate)
+
+
+def test_another_seed_gives_other_draws(tmp_path: Path) -> None:
+    measurement = small_measurement()
+    samples = [
+        Study.load(write_study(tmp_path / str(seed), measurement, seed=seed), workers=1).fit().samples
+        for seed in (0, 1)
+    ]
+    assert not np.array_equal(samples[0], samples[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("after", [3, 20])
+def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -> None:
+    """kill -9 in the first and in the second round; the draws that were there are not simulated again."""
+    measurement = small_measurement()
+    whole = Study.load(write_study(tmp_path / "whole", measurement), workers=1).fit()
+    path = write_study(tmp_path / "killed", measurement)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "muslin.cli", "fit", str(path), "--workers", "1"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        cwd=tmp_path,
+    )
+    status = path.parent / "study.results.zarr/fit/draws/status/c"
+    deadline = time.monotonic() + 120
+    while len(list(status.glob("*"))) < after:
+        assert process.poll() is None, "the fit ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    done = {f.name: f.stat().st_mtime_ns for f in status.glob("*") if f.name.isdigit()}
+    with pytest.raises(StepMissingError):
+        Study.load(path).step_results("fit")
+    continued = Study.load(path, workers=1).fit()
+    np.testing.assert_array_equal(continued.samples, whole.samples)
+    np.testing.assert_array_equal(continued.estimate, whole.estimate)
+    assert len(done) >= after
+    for name, when in done.items():
+        assert (status / name).stat().st_mtime_ns == when, f"draw {name} was simulated again"
+
+
+def test_results_open_in_xarray_with_units(small_study: Study) -> None:
+    small_study.fit()
+    draws = xarray.open_zarr(small_study.results_path, group="fit/draws", consolidated=False)
+    assert draws["points_near"].dims == ("draw", "time_near", "point", "axis")
+    assert draws["points_near"].attrs["units"] == "m"
+    assert np.isfinite(draws["points_near"].values).all()
+    samples = xarray.open_zarr(small_study.results_path, group="fit", consolidated=False)["posterior_samples"]
+    assert samples.shape == (2000, 2)
+
+
+def test_a_changed_study_is_fitted_anew(small_study: Study) -> None:
+    small_study.fit()
+    before = read(small_study.step_results("fit"), "estimate")
+    changed = Study.load(small_study.path, workers=1)
+    changed.config.material["areal_density"] = 0.3
+    after = changed.fit()
+    assert not np.allclose(before, after.estimate, rtol=1e-3)
+
+
+def test_steps_say_what_is_missing(small_study: Study) -> None:
+    with pytest.raises(StepMissingError, match="muslin fit"):
+        small_study.compare()

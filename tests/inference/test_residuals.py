@@ -1,0 +1,81 @@
+"""Residuals and the noise: offsets are found, noise is estimated, repeats tell it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from muslin.core.measurement import Recording
+from muslin.core.series import PointSeries
+from muslin.inference.noise import Noise, _fourth_difference, _lag_one
+from muslin.inference.residuals import Offsets, failed, residual
+
+TIME = np.arange(0, 2, 0.02)
+NOISE = Noise(0.001, 0.0, "test", "m", 0.01)
+
+
+def wave(shift: float = 0.0) -> np.ndarray:
+    t = TIME[:, None] + shift
+    phase = np.array([0.0, 0.7, 1.9])
+    return np.stack([0.05 * np.sin(5 * t + phase), 0.02 * np.cos(9 * t + phase), 0.1 * t + 0 * phase], axis=-1)
+
+
+def test_without_offsets_it_is_the_plain_difference_over_the_noise() -> None:
+    recording = Recording("a", PointSeries(TIME, wave() + 0.002))
+    r = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets())
+    np.testing.assert_allclose(r.difference, 0.002, atol=1e-12)
+    np.testing.assert_allclose(r.white, 2.0, atol=1e-9)
+    assert r.rms == pytest.approx(0.002)
+
+
+def test_clock_and_constant_offsets_are_taken_out() -> None:
+    recording = Recording("a", PointSeries(TIME, wave(0.013) + np.array([0.003, -0.001, 0.002])))
+    r = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets(clock=0.02, constant=0.01))
+    assert r.clock == pytest.approx(0.013, abs=1e-3)
+    assert r.rms < 0.0006
+
+
+def test_a_prior_keeps_a_clock_offset_from_explaining_everything() -> None:
+    recording = Recording("a", PointSeries(TIME, wave(0.2)))
+    r = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets(clock=0.005))
+    assert abs(r.clock) <= 0.02
+    assert r.rms > 0.005
+
+
+def test_points_not_seen_do_not_count() -> None:
+    points = wave() + 0.001
+    points[10:20, 1] = np.nan
+    recording = Recording("a", PointSeries(TIME, points))
+    r = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets())
+    assert len(r.white) == points.size - 30
+    assert len(failed(recording, Offsets(0.01, 0.01))) == len(r.white) + 4
+
+
+def test_without_correspondence_order_does_not_matter() -> None:
+    points = wave()
+    shuffled = points[:, [2, 0, 1]]
+    recording = Recording("a", PointSeries(TIME, shuffled, correspondence=False))
+    r = residual(recording, PointSeries(TIME, points, correspondence=False), NOISE, Offsets())
+    assert r.rms < 1e-12
+
+
+def test_correlated_noise_counts_less() -> None:
+    recording = Recording("a", PointSeries(TIME, wave() + 0.002))
+    white = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets()).white
+    red = residual(recording, PointSeries(TIME, wave()), replace(NOISE, ar1=0.8), Offsets()).white
+    assert red @ red == pytest.approx(white @ white * 0.2 / 1.8)
+
+
+@pytest.mark.parametrize("sd", [0.0005, 0.003])
+def test_roughness_finds_the_noise_of_a_smooth_motion(sd: float) -> None:
+    rng = np.random.default_rng(3)
+    recording = Recording("a", PointSeries(TIME, wave() + rng.normal(0, sd, wave().shape)))
+    d = _fourth_difference(recording)
+    assert 1.4826 * np.median(np.abs(d)) == pytest.approx(sd, rel=0.15)
+
+
+def test_lag_one_correlation() -> None:
+    rng = np.random.default_rng(4)
+    x = np.zeros((4000, 1, 1))
+    for t in range(1, len(x)):
+        x[t] = 0.7 * x[t - 1] + rng.normal()
+    assert _lag_one(x) == pytest.approx(0.7, abs=0.04)

@@ -1,0 +1,82 @@
+"""The five verdicts, from made-up evidence: each bar is what decides."""
+
+import numpy as np
+import pytest
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
+from muslin.inference.criticism.verdict import Decision, Evidence, decide
+from muslin.inference.polish import Polished
+
+COUNT = 3000.0
+
+
+def candidate(
+    name: str, rss: float, held_out: float = 0.003, coefficient: float = 0.5, sd: float = 0.01
+) -> Candidate:
+    space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
+    white = np.full(int(COUNT), np.sqrt(rss / COUNT))
+    fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, 1.0)
+    return Candidate(name, space, 1, fit, {"other": held_out})
+
+
+def evidence(rss: float, *candidates: Candidate, held_out: float = 0.010) -> Evidence:
+    return Evidence(rss, COUNT, held_out, 0.003, 0.01, candidates)
+
+
+def test_named() -> None:
+    e = evidence(9 * COUNT, candidate("drag", 1.02 * COUNT), candidate("wind", 6 * COUNT))
+    assert decide(e) == Decision("named", ("drag",))
+    assert e.explained(e.candidates[0]) == pytest.approx(1.0, abs=0.01)
+
+
+def test_tied_when_rivals_are_within_the_margin() -> None:
+    e = evidence(9 * COUNT, candidate("drag", 1.0 * COUNT), candidate("damping", 1.0 * COUNT + 6))
+    assert decide(e) == Decision("tied", ("drag", "damping"))
+
+
+def test_tied_when_the_difference_is_small_against_what_both_leave() -> None:
+    """On data of another discretisation every difference is significant; the share left over says more."""
+    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT), candidate("damping", 2.3 * COUNT))
+    assert decide(e).verdict == "tied"
+    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT), candidate("damping", 2.8 * COUNT))
+    assert decide(e) == Decision("named", ("drag",))
+
+
+def test_none_when_nothing_explains_half() -> None:
+    assert decide(evidence(9 * COUNT, candidate("drag", 6 * COUNT), candidate("wind", 8 * COUNT))).verdict == "none"
+
+
+def test_not_named_when_the_held_out_motion_gets_worse() -> None:
+    assert decide(evidence(9 * COUNT, candidate("drag", 1.5 * COUNT, held_out=0.011))).verdict == "none"
+
+
+def test_not_named_when_the_coefficient_may_be_zero() -> None:
+    assert decide(evidence(9 * COUNT, candidate("drag", 1.5 * COUNT, coefficient=0.01))).verdict == "none"
+
+
+def test_no_misfit_and_cannot_tell_differ_in_what_the_data_could_show() -> None:
+    seen, unseen = candidate("drag", COUNT - 1), candidate("lag", COUNT - 1, sd=0.3)
+    assert decide(evidence(1.01 * COUNT, seen, seen)).verdict == "no-misfit"
+    assert decide(evidence(1.01 * COUNT, unseen, unseen)).verdict == "cannot-tell"
+
+
+def test_a_small_but_certain_effect_is_named() -> None:
+    """Its misfit is within what the estimate of the noise may be off, but the gain cannot be chance."""
+    e = evidence(1.10 * COUNT, candidate("tilt", 1.0 * COUNT, held_out=0.0030), held_out=0.0031)
+    assert decide(e) == Decision("named", ("tilt",))
+
+
+def test_significance_allows_for_what_is_left_and_for_how_many_were_tried() -> None:
+    good, poor = candidate("a", COUNT), candidate("a", 4 * COUNT)
+    assert z_value(COUNT + 30, good, 1) > z_value(COUNT + 30, good, 20)
+    assert z_value(4 * COUNT + 30, poor, 1) < z_value(COUNT + 30, good, 1)
+    assert z_value(COUNT, good, 1) == 0.0
+    assert np.isfinite(z_value(1e9, good, 6))
+
+
+def test_screening_covers_the_prior_of_the_coefficients() -> None:
+    space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter("drag.strength", "1", 0, 1)))
+    points = screening_points(space, 1, np.array([[0.3]]), 16, np.random.default_rng(0))
+    assert points.shape == (16, 2)
+    assert (points[::2, 0] == 0.3).all()
+    assert np.ptp(points[:, 1]) > 0.8
