@@ -71,7 +71,7 @@ def diagnose(
         write_whole(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
-    if verdict.get("verdict") == "named" and effects:
+    if verdict.get("verdict") in ("named", "tied") and effects:
         output = study.with_name(f"{study.stem}-with-{effects[0]}.toml")
         next_step(f"muslin add {effects[0]} {study} -o {output}", f"muslin report {study}")
     else:
@@ -106,16 +106,21 @@ def report(
         Path | None,
         typer.Option("-o", "--output", metavar="REPORT.html", help="The HTML file; default beside the study."),
     ] = None,
+    after: Annotated[
+        Path | None,
+        typer.Option(
+            "--after",
+            metavar="STUDY2.toml",
+            help="A compared study with what was added; its errors are shown as after.",
+        ),
+    ] = None,
 ) -> None:
     """Write one self-contained HTML file: fit, errors over time, ranking of effects, before and after."""
     from .report import write_report
 
     if output is not None:
         check_output(output, force=True)
-    made = write_report(Study.load(study))
-    if output is not None and output.resolve() != made.resolve():
-        write_whole(output, made.read_text(encoding="utf-8"))
-        made = output
+    made = write_report(Study.load(study), output, Study.load(after) if after is not None else None)
     say(f"wrote {made}")
     say("open it in a browser; it needs no other file")
 

@@ -45,11 +45,13 @@ def study(folder: Path) -> Path:
     muslin(folder, "compare", "study.toml")
     muslin(folder, "diagnose", "study.toml", "--json", "diagnosis.json")
     found = json.loads((folder / "diagnosis.json").read_text())["effects"]
+    after = []
     if found:
         muslin(folder, "add", found[0], "study.toml", "-o", "study2.toml")
         muslin(folder, "fit", "study2.toml")
         muslin(folder, "compare", "study2.toml")
-    muslin(folder, "report", "study.toml", "-o", "report.html")
+        after = ["--after", "study2.toml"]
+    muslin(folder, "report", "study.toml", *after, "-o", "report.html")
     return folder / "report.html"
 
 

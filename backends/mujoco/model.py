@@ -60,11 +60,9 @@ def mjcf(scene: Scene, time_step: float) -> str:
     cells = quadratic_cells(body)
     parts = f' dof="quadratic" cellcount="{cells[0]} {cells[1]} {cells[2]}"' if cells else ""
     contact = scene.table_height is not None
-    table = (
-        f'<geom type="plane" size="5 5 0.1" pos="0 0 {scene.table_height:.17g}" friction="{m.friction:.17g} 0 0"/>'
-        if contact
-        else ""
-    )
+    # the stiffest contact that a time step allows (solref: time constant, damping ratio)
+    touch = f'friction="{m.friction:.17g} 0 0" solref="{2 * time_step:.17g} 1"'
+    table = f'<geom type="plane" size="5 5 0.1" pos="0 0 {scene.table_height:.17g}" {touch}/>' if contact else ""
     points = " ".join(f"{x:.17g}" for x in body.vertices.ravel())
     elements = " ".join(str(i) for i in body.elements.ravel())
     gravity = " ".join(f"{g:.17g}" for g in scene.gravity)
@@ -77,7 +75,7 @@ def mjcf(scene: Scene, time_step: float) -> str:
     {table}
     <flexcomp name="body" type="direct" dim="{2 if body.kind == "cloth" else 3}"{parts}
         mass="{float(body.measures.sum()) * m.density:.17g}" radius="{RADIUS}" point="{points}" element="{elements}">
-      <contact selfcollide="none" condim="3" friction="{m.friction:.17g} 0 0"/>
+      <contact selfcollide="none" condim="3" {touch}/>
       {elasticity(scene, time_step)}
     </flexcomp>
   </worldbody>

@@ -148,16 +148,25 @@ def check_force_ends(make: MakeSimulator, kind: str) -> None:
 
 
 def check_table(make: MakeSimulator, kind: str) -> None:
-    """The object falls onto a table, to within 2 cm, and not through it."""
+    """The object falls onto a table, reaches it and ends on it or above it, to within 1 cm.
+
+    While it lands it may go deeper, by the way that it falls in two steps: no engine can stop what it
+    has not seen touch yet.
+    """
     scene = sample_scene(kind, table_height=0.85)
 
     def look(world: World) -> None:
-        lowest = np.inf
+        lowest, fastest = np.inf, 0.0
         for _ in range(int(np.ceil(0.5 / world.time_step))):
             world.step(np.zeros((0, 3)), None)
-            lowest = min(lowest, float(world.state().positions[:, 2].min()))
-        must(lowest > 0.83, f"within 0.5 s a vertex gets to {lowest:.3f} m, below the table at 0.85 m")
-        must(lowest < 0.87, f"within 0.5 s no vertex gets below {lowest:.3f} m, though the table is at 0.85 m")
+            state = world.state()
+            lowest = min(lowest, float(state.positions[:, 2].min()))
+            fastest = max(fastest, float(-state.velocities[:, 2].min()))
+        deepest = 0.84 - 2 * fastest * world.time_step
+        last = float(world.state().positions[:, 2].min())
+        must(lowest > deepest, f"within 0.5 s a vertex gets to {lowest:.3f} m, below the table at 0.85 m")
+        must(lowest < 0.86, f"within 0.5 s no vertex gets below {lowest:.3f} m, though the table is at 0.85 m")
+        must(last > 0.84, f"after 0.5 s the lowest vertex is at {last:.3f} m, though the table is at 0.85 m")
 
     _with_world(make(), scene, look)
 

@@ -10,9 +10,7 @@ from muslin.inference.polish import Polished
 COUNT = 3000.0
 
 
-def candidate(
-    name: str, rss: float, held_out: float = 0.003, coefficient: float = 0.5, sd: float = 0.01
-) -> Candidate:
+def candidate(name: str, rss: float, held_out: float = 0.003, coefficient: float = 0.5, sd: float = 0.01) -> Candidate:
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
     white = np.full(int(COUNT), np.sqrt(rss / COUNT))
     fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, 1.0)
