@@ -95,7 +95,7 @@ def add(
     if target.resolve() == study.resolve():
         raise InputError(f"{target} is the study itself; name another file with -o")
     check_output(target, force)
-    made = loaded.add(effect, target)
+    made = loaded.add(effect, target, overwrite=force)
     say(f"wrote {made.path}: the model of {study} with {effect}")
     next_step(f"muslin fit {made.path}")
 

@@ -30,12 +30,15 @@ class DrawStore:
     def __init__(self, study: Study, problem: Problem, count: int) -> None:
         self._path = study.results_path
         self._recordings = list(problem.fit_on)
-        root = study.results("r+")
         fingerprint = study.fingerprint()
-        fit = root.require_group("fit")
-        if fit.attrs.get("fingerprint") != fingerprint:
+        found = study.results("r+").get("fit")
+        if isinstance(found, zarr.Group) and found.attrs.get("fingerprint") not in (None, fingerprint):
+            study.progress(f"the study has changed; its earlier results are kept in {study.set_aside()}", 0, 0)
+            found = None
+        fit = found if isinstance(found, zarr.Group) and "fingerprint" in found.attrs else None
+        if fit is None:
             with storage_errors(self._path):
-                fit = self._create(root, problem, count, fingerprint)
+                fit = self._create(study.results("r+"), problem, count, fingerprint)
         self.group: zarr.Group = fit
         self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
         self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
@@ -43,10 +46,7 @@ class DrawStore:
 
     @staticmethod
     def _create(root: zarr.Group, problem: Problem, count: int, fingerprint: dict[str, Any]) -> zarr.Group:
-        for name in ("fit", "compare", "diagnose"):  # results of another model or measurement
-            if name in root:
-                del root[name]
-        fit = root.create_group("fit")
+        fit = root.create_group("fit", overwrite=True)
         draws = fit.create_group("draws")
         draws.attrs["parameters"] = list(problem.space.names)
         empty_draws(draws, "theta", (count, len(problem.space)), ["draw", "parameter"], "unit cube", "float64", np.nan)

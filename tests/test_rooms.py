@@ -6,8 +6,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import muslin
 import pytest
+
+import muslin
 
 ROOT = Path(muslin.__file__).parent
 ROOMS = ("core", "backends", "perception", "inference", "plugins", "cli")

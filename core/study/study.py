@@ -1,5 +1,6 @@
 """The study: one file that names everything, and one store that holds every result."""
 
+import hashlib
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
@@ -73,11 +74,30 @@ class Study:
         return SimulationPool(problem or self.problem, self.workers)
 
     def fingerprint(self) -> dict[str, Any]:
-        """What the draws of a fit depend on; draws of another fingerprint are not continued."""
+        """What a fit depends on: study file, measured numbers, engine. Another fingerprint is another fit."""
         table = self.config.model_dump(mode="json", exclude={"diagnose"})
-        table["study"].pop("results", None)
-        table["study"].pop("hold_out", None)
+        for key in ("results", "hold_out", "measurement"):
+            table["study"].pop(key, None)
+        digest = hashlib.sha256()
+        for name in self.problem.fit_on:
+            recording = self.problem.recordings[name]
+            digest.update(f"{name} {recording.motion} {recording.load!r}".encode())
+            digest.update(recording.series.time.tobytes() + recording.series.points.tobytes())
+            if recording.gripper is not None:
+                digest.update(recording.gripper.times.tobytes() + recording.gripper.poses.tobytes())
+        table["measured"] = digest.hexdigest()
+        table["engine"] = self.problem.simulator.engine_version()
         return table
+
+    def set_aside(self) -> Path | None:
+        """Move results of an earlier state of the study out of the way; nothing that was simulated is lost."""
+        if not self.results_path.exists():
+            return None
+        number = 1
+        while (old := self.results_path.with_name(f"{self.results_path.stem}.old{number}.zarr")).exists():
+            number += 1
+        self.results_path.rename(old)
+        return old
 
     def results(self, mode: str = "r") -> zarr.Group:
         """The results store; made empty on the first write."""
@@ -111,17 +131,20 @@ class Study:
         """Say which effect is missing; see the step ``diagnose``."""
         return REGISTRY.get("step", "diagnose")(self)
 
-    def add(self, effect: str, output: str | Path | None = None) -> "Study":
+    def add(self, effect: str, output: str | Path | None = None, *, overwrite: bool = False) -> "Study":
         """A study of the same model with one more effect, its coefficients inferred.
 
         Args:
             effect: name of an effect plugin.
-            output: the new study file, in the same folder; default ``STEM-with-EFFECT.toml``.
+            output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one.
+            overwrite: replace a file that is there.
         """
         REGISTRY.get("effect", effect)
         if effect in self.config.effects:
             raise InputError(f"{self.path} has {effect!r} already")
         path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")
+        if path.exists() and not overwrite:
+            raise InputError(f"{path} exists already; name another file, or say overwrite=True (--force)")
         config = self.config.model_copy(deep=True)
         config.effects[effect] = {}
         if config.study.results is not None:

@@ -13,7 +13,7 @@ from ...core.rollout import Trajectory
 from ...core.scenario import Scenario
 from ...core.series import PointSeries
 from ...core.store import put, storage_errors
-from ...core.study import SimulationPool, Study, Task
+from ...core.study import Study, Task
 from ..fitting import FitResult, load_fit, offsets_of
 from ..noise import Noise
 from ..residuals import Residual, residual

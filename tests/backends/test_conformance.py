@@ -3,6 +3,7 @@
 import importlib
 
 import pytest
+
 from muslin.core.registry import REGISTRY
 from muslin.core.testing import check_simulator
 

@@ -11,10 +11,11 @@ import tempfile
 import time
 from pathlib import Path
 
+from table import Row, report
+
 from muslin.core.measurement_store import save_measurement
 from muslin.core.study import Study, read_config, write_config
 from muslin.core.synthetic import STRENGTHS, hidden_effect
-from table import Row, report
 
 STUDY = Path(__file__).resolve().parents[2] / "examples/hidden_effect/study.toml"
 FIRST_SEED = 100

@@ -5,8 +5,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from muslin.core.measurement_store import save_measurement
 from running import Done, Muslin, cloth_measurement
+
+from muslin.core.measurement_store import save_measurement
 
 
 @pytest.fixture

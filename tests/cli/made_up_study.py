@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import zarr
+
 from muslin.core.arrays import FloatArray, IntArray
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement

@@ -4,6 +4,7 @@ import subprocess
 from collections.abc import Callable
 
 import numpy as np
+
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.motion import Motion
 from muslin.core.scenarios import preset

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from running import Muslin, cloth_measurement
+
 from muslin.cli.console import ProgressView
 from muslin.cli.failure import BAD_INPUT, INTERNAL, describe
 from muslin.cli.main import run
@@ -15,7 +17,6 @@ from muslin.core.errors import InputError
 from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.registry import REGISTRY
 from muslin.core.study import Study, build_problem, read_config
-from running import Muslin, cloth_measurement
 
 
 class Result:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from made_up_study import ROLES, make_study, takes
+
 from muslin.cli.report import overview_figure, write_report
 from muslin.cli.report.words import spread
 from muslin.core.errors import MuslinError, StepMissingError, StoreError

@@ -2,6 +2,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.errors import InputError
 

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError
 from muslin.core.importing import ImportOptions, import_file
 

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+
 from muslin.core.arrays import FloatArray
 from muslin.core.effect import Effect, NodalForce
 from muslin.core.extractor import KeypointExtractor

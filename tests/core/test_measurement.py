@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from muslin.core.errors import InputError, MuslinError
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import load_measurement, read_hidden, save_measurement

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from muslin.core.errors import InputError
 from muslin.core.parameters import Parameter, ParameterSpace
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
 from muslin.core.errors import BrokenPluginError, InputError, UnknownPluginError
 from muslin.core.registry import Registry
 

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError, MissingFileError, StoreError
 from muslin.core.store import new_store, open_store, put, read, storage_errors, subgroup
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError, MissingFileError, MuslinError
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.registry import REGISTRY

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 import pytest
-from muslin.core.study import Study
 from small import small_measurement, write_study
+
+from muslin.core.study import Study
 
 
 @pytest.fixture

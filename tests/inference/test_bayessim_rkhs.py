@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError, StepMissingError
 from muslin.core.testing import estimators as kit
 

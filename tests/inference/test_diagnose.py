@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small import small_measurement, write_study
+
 from muslin.core.errors import InputError
 from muslin.core.study import Study
 from muslin.inference.criticism.diagnose import Diagnosis
 from muslin.plugins.effects.air import AirDrag
-from small import small_measurement, write_study
 
 pytest.importorskip("mujoco")
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from muslin.core.arrays import FloatArray
 from muslin.core.errors import InputError
 from muslin.core.estimator import Posterior, PosteriorEstimator

@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+import zarr
+from small import TRUTH, small_measurement, write_study
+
 from muslin.core.errors import StepMissingError
+from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
-from small import TRUTH, small_measurement, write_study
 
 pytest.importorskip("mujoco")
 
@@ -106,6 +109,16 @@ def test_a_changed_study_is_fitted_anew(small_study: Study) -> None:
     changed.config.material["areal_density"] = 0.3
     after = changed.fit()
     assert not np.allclose(before, after.estimate, rtol=1e-3)
+    old = small_study.path.with_name("study.results.old1.zarr")
+    np.testing.assert_array_equal(zarr.open_group(old / "fit", mode="r")["estimate"][...], before)
+
+
+def test_a_changed_measurement_is_fitted_anew(small_study: Study) -> None:
+    small_study.fit()
+    before = read(small_study.step_results("fit"), "estimate")
+    save_measurement(small_measurement(seed=5), small_study.measurement_path, overwrite=True)
+    after = Study.load(small_study.path, workers=1).fit()
+    assert not np.array_equal(before, after.estimate)
 
 
 def test_steps_say_what_is_missing(small_study: Study) -> None:

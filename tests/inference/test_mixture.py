@@ -2,6 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from muslin.core.errors import InputError, MissingFileError
 from muslin.core.testing import estimators as kit
 

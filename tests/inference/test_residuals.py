@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
 from muslin.inference.noise import Noise, _fourth_difference, _lag_one

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
 from muslin.inference.criticism.verdict import Decision, Evidence, decide

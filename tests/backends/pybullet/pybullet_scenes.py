@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+
 from muslin.backends.pybullet import PybulletSimulator
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.material import Material

@@ -5,10 +5,11 @@ import pytest
 
 pytest.importorskip("pybullet")
 
+from pybullet_scenes import GRAVITY, NONE_HELD, SMALL_CLOTH, WEIGHTLESS, flat, opened, run, scene
+
 from muslin.backends.pybullet.bending import bending_matrix, is_flat
 from muslin.core.body import Body, cloth_grid
 from muslin.core.material import ClothMaterial
-from pybullet_scenes import GRAVITY, NONE_HELD, SMALL_CLOTH, WEIGHTLESS, flat, opened, run, scene
 
 
 @pytest.mark.parametrize("poisson", [0.1, 0.4])

@@ -9,8 +9,9 @@ import pytest
 
 pytest.importorskip("pybullet")
 
-from muslin.core.material import ClothMaterial, SolidMaterial
 from pybullet_scenes import GRAVITY, NOWHERE, SMALL_CLOTH, SMALL_SOLID, WEIGHTLESS, opened, run, scene
+
+from muslin.core.material import ClothMaterial, SolidMaterial
 
 BODIES = [
     pytest.param(SMALL_CLOTH, ClothMaterial(damping_time=1e-3), id="cloth"),

@@ -12,11 +12,12 @@ import pytest
 
 pytest.importorskip("pybullet")
 
+from pybullet_scenes import NOWHERE, SMALL_CLOTH, opened, scene
+
 from muslin.backends.pybullet import PybulletSimulator, library
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.errors import InputError, RolloutFailed
 from muslin.core.material import ClothMaterial, SolidMaterial
-from pybullet_scenes import NOWHERE, SMALL_CLOTH, opened, scene
 
 
 def test_travels_and_names_its_engine():

@@ -5,10 +5,11 @@ import pytest
 
 pytest.importorskip("pybullet")
 
+from pybullet_scenes import GRAVITY, NOWHERE, WEIGHTLESS, opened, run, scene
+
 from muslin.backends.pybullet.elements import Elements, volumetric
 from muslin.core.body import Body, solid_box
 from muslin.core.material import SolidMaterial
-from pybullet_scenes import GRAVITY, NOWHERE, WEIGHTLESS, opened, run, scene
 
 E, NU, L, H, RHO = 264e3, 0.3, 0.1, 0.03, 1070.0
 AREA, INERTIA, SHEAR = H * H, H**4 / 12, E / 2 / (1 + NU)

@@ -1,0 +1,200 @@
+"""What holds on every engine: closed forms, held vertices, and effects that are exactly off at zero."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from engine_runs import ENGINES, G, extremes, scenario, simulator, turned
+
+from muslin.core.body import cloth_grid, solid_box
+from muslin.core.errors import InputError
+from muslin.core.material import ClothMaterial, SolidMaterial
+from muslin.core.motion import Motion
+from muslin.core.registry import REGISTRY
+from muslin.core.rollout import rollout
+from muslin.core.simulator import Simulator
+from muslin.plugins.effects.air import AirDrag
+from muslin.plugins.effects.surface import AIR_DENSITY
+
+CLOTH = cloth_grid(0.12, 0.12, 4, 4)
+SOLID = solid_box(np.zeros(3), np.array([0.06, 0.05, 0.04]), (3, 3, 3))
+OBJECTS = {
+    "cloth": (CLOTH, ClothMaterial(stretch_stiffness=60.0), np.array([0, 3])),
+    "solid": (SOLID, SolidMaterial(youngs_modulus=5e4), np.arange(9)),
+}
+KINDS = tuple(OBJECTS)
+EFFECTS = ("actuator-lag", "air-drag", "gravity-tilt", "internal-damping", "viscous-damping", "wind")
+
+pytestmark = pytest.mark.parametrize("engine", ENGINES)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_free_fall(engine, kind):
+    """g t^2 / 2 to half a step; exactly the symplectic Euler sum g t (t + s) / 2 of a step s of at most the world's."""
+    body, material, _ = OBJECTS[kind]
+    times = np.array([0.0, 0.1, 0.2, 0.3])
+    path = rollout(simulator(engine, time_step=0.005), scenario(body, turned(0.4), times), material).vertices
+    moved = path - path[0]
+    np.testing.assert_allclose(moved[:, :, :2], 0.0, atol=1e-9)
+    fallen, t = -moved[1:, :, 2], times[1:, None]
+    assert (np.abs(fallen - 0.5 * G * t**2) <= 0.5 * G * t * 0.005 + 1e-9).all()
+    step = 2 * fallen / (G * t) - t
+    assert 0 < step.mean() < 0.005 + 1e-9
+    np.testing.assert_allclose(step, step.mean(), atol=1e-7)
+
+
+@pytest.mark.parametrize(("areal_density", "drag"), [(0.15, 1.2), (0.3, 0.6)])
+def test_terminal_velocity_of_a_broadside_sheet(engine, areal_density, drag):
+    """sqrt(2 m g / (rho C_D A)) to 1e-4, and on the way v^2 / g ln cosh(g t / v) to what one step moves."""
+    final = np.sqrt(2 * areal_density * G / (AIR_DENSITY * drag))
+    times = np.linspace(0.0, 6 * final / G, 61)
+    flat = scenario(cloth_grid(0.3, 0.3, 4, 4), turned(np.pi / 2), times)
+    effects = [AirDrag(drag_coefficient=drag)]
+    path = rollout(simulator(engine), flat, ClothMaterial(areal_density=areal_density), effects).vertices
+    fallen = path[0, :, 2] - path[:, :, 2]
+    np.testing.assert_allclose(np.diff(fallen[-2:], axis=0) / (times[-1] - times[-2]), final, rtol=1e-4)
+    expected = final**2 / G * np.log(np.cosh(G * times / final))
+    np.testing.assert_allclose(fallen, np.tile(expected[:, None], len(flat.body.vertices)), atol=final * 0.005)
+
+
+def test_terminal_velocity_of_a_box(engine):
+    """Air meets a closed body on its leading faces alone: A is one face, where a sheet has one for two sides.
+
+    After a second; later the box, pushed from below its centre, tips over, which is physics.
+    """
+    body = solid_box(np.zeros(3), np.array([0.06, 0.06, 0.02]), (3, 3, 3))
+    material = SolidMaterial(density=20.0, youngs_modulus=2e4)
+    final = np.sqrt(2 * 20.0 * 0.02 * G / (AIR_DENSITY * 1.2))
+    times = np.array([0.0, 0.95, 1.0])
+    effects = [AirDrag(drag_coefficient=1.2)]
+    height = rollout(simulator(engine), scenario(body, turned(0.0), times), material, effects).vertices[:, :, 2]
+    speed = -np.diff(height[1:].mean(axis=1)) / 0.05
+    assert speed == pytest.approx(final * np.tanh(G * 0.975 / final), rel=2e-3)
+
+
+@pytest.mark.parametrize("length", [0.2, 0.1])
+def test_pendulum_period(engine, length):
+    """A stiff strip that hangs from its top edge: a compound pendulum of the strip's lumped masses.
+
+    2 pi sqrt(I / (m g r)), with (1 + angle^2 / 16) for the amplitude; for a uniform rod that is
+    2 pi sqrt(2 L / (3 g)), which the lumping misses by 1 %.
+    """
+    angle = 0.1
+    body = cloth_grid(length / 5, length, 2, 6)
+    material = ClothMaterial(stretch_stiffness=3000.0, bending_rigidity=1e-2)
+    period = 2 * np.pi * np.sqrt(2 * length / 3 / G)
+    below, mass = -body.vertices[:, 2], body.vertex_measures
+    expected = 2 * np.pi * np.sqrt((mass @ below**2) / (mass @ below) / G) * (1 + angle**2 / 16)
+    assert expected == pytest.approx(period, rel=0.015)
+    step = 0.005
+    times = np.arange(0.0, 3.3 * period, step)
+    path = rollout(simulator(engine), scenario(body, turned(angle), times, ([0, 1],)), material).vertices
+    tip = path[:, -2:].mean(axis=1) - [0.0, 0.0, 1.0]
+    np.testing.assert_allclose(np.linalg.norm(tip, axis=1), length, rtol=1e-3)
+    when, what = extremes(step, np.arctan2(tip[:, 1], -tip[:, 2]))
+    large = np.abs(what) > 0.3 * angle  # a fast ripple of the stretch must not count
+    assert 2 * np.diff(when[large]).mean() == pytest.approx(expected, rel=0.005)
+
+
+def carried(kind, **more):
+    """An object held and carried to and fro, turning, with the command sampled at the world's steps."""
+    body, material, grasp = OBJECTS[kind]
+    times = np.arange(61) * 0.005
+    phase = np.pi * times / times[-1]
+    place = np.stack([0.05 * np.sin(phase), 0.08 * np.sin(phase) ** 2, 1.0 + 0.0 * phase], axis=1)
+    half = 0.2 * np.sin(phase)
+    turn = np.stack([np.cos(half), np.sin(half), 0 * half, 0 * half], axis=1)
+    motion = Motion(times, np.concatenate([place, turn], axis=1)[:, None])
+    return scenario(body, motion, times, (grasp,), **more), material
+
+
+@pytest.fixture(scope="module")
+def plain():
+    """The rollout without effects of every engine and kind, made once."""
+    made = {}
+
+    def get(engine, kind):
+        if (engine, kind) not in made:
+            made[engine, kind] = rollout(simulator(engine), *carried(kind)).vertices
+        return made[engine, kind]
+
+    return get
+
+
+def coefficients(effect, share):
+    return {c.name: share * c.high for c in REGISTRY.get("effect", effect).coefficients}
+
+
+def test_the_six_effects_are_there(engine):
+    assert set(EFFECTS) <= set(REGISTRY.names("effect"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_repeated_rollout_is_bit_identical(engine, kind, plain):
+    np.testing.assert_array_equal(plain(engine, kind), rollout(simulator(engine), *carried(kind)).vertices)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("effect", EFFECTS)
+def test_an_effect_at_zero_is_exactly_off_and_at_half_its_range_is_not(engine, kind, effect, plain):
+    made = REGISTRY.get("effect", effect)
+    off = rollout(simulator(engine), *carried(kind), [made(**coefficients(effect, 0.0))]).vertices
+    np.testing.assert_array_equal(off, plain(engine, kind))
+    on = [rollout(simulator(engine), *carried(kind), [made(**coefficients(effect, 0.5))]).vertices for _ in range(2)]
+    np.testing.assert_array_equal(on[0], on[1])
+    assert np.abs(on[0] - plain(engine, kind)).max() > 1e-6  # air hardly moves a block: 8e-6 m
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_effects_at_zero_leave_one_that_is_on_alone(engine, kind):
+    """All six at once, five of them off, in any order."""
+    wind = REGISTRY.get("effect", "wind")(velocity_x=1.0)
+    others = [REGISTRY.get("effect", e)(**coefficients(e, 0.0)) for e in EFFECTS]
+    alone = rollout(simulator(engine), *carried(kind), [wind]).vertices
+    np.testing.assert_array_equal(alone, rollout(simulator(engine), *carried(kind), [*others, wind]).vertices)
+    np.testing.assert_array_equal(alone, rollout(simulator(engine), *carried(kind), [wind, *others]).vertices)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("lag", [0.0, 0.03])
+def test_held_vertices_follow_the_command_exactly(engine, kind, lag):
+    """To rounding, at every step, translating and turning; with a lag they follow the lagging command."""
+    task, material = carried(kind)
+    effect = REGISTRY.get("effect", "actuator-lag")(time_constant=lag)
+    done = rollout(simulator(engine), task, material, [effect])
+    made = effect.on_command(task.motion, 0.005) if lag else task.motion
+    expected = task.held_positions(made, task.times, task.world_vertices())
+    np.testing.assert_allclose(done.vertices[:, task.held], expected, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(done.poses, made.at(task.times))
+    assert np.ptp(expected, axis=0).max() > 0.05
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_start_is_the_scenario_even_after_settling(engine, kind):
+    """Without settling the first frame is the rest shape; with it the object already hangs, held where it was."""
+    body, material, grasp = OBJECTS[kind]
+    task = scenario(body, turned(0.0), [0.0, 0.1], (grasp,))
+    np.testing.assert_array_equal(rollout(simulator(engine), task, material).vertices[0], task.world_vertices())
+    settled = rollout(simulator(engine), replace(task, settle=1.0), material).vertices
+    np.testing.assert_allclose(settled[0, grasp], task.world_vertices()[grasp], atol=1e-12)
+    assert np.abs(settled[0] - task.world_vertices()).max() > 1e-4
+    # A tenth of what an unsettled object moves in the same time.
+    moved = [np.abs(v[1] - v[0]).max() for v in (settled, rollout(simulator(engine), task, material).vertices)]
+    assert moved[0] < 0.1 * moved[1]
+
+
+def test_a_kind_of_object_it_does_not_have_is_refused_with_the_kinds_it_has(engine):
+    class ClothOnly(type(simulator(engine))):
+        object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth"})
+
+    body, material, grasp = OBJECTS["solid"]
+    only: Simulator = ClothOnly()
+    with pytest.raises(InputError, match=f"simulator '{engine}' has no solid; it has cloth"):
+        rollout(only, scenario(body, turned(0.0), [0.0, 0.1], (grasp,)), material)
+
+
+@pytest.mark.parametrize("vertex", [16, -1])
+def test_a_grasp_vertex_that_does_not_exist_is_refused_with_its_number(engine, vertex):
+    with pytest.raises(InputError, match=f"gripper 0 takes vertex {vertex}, but the mesh has vertices 0 to 15"):
+        rollout(simulator(engine), scenario(CLOTH, turned(0.0), [0.0, 0.1], ([0, vertex],)), ClothMaterial())
