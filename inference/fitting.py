@@ -61,9 +61,10 @@ class FitResult:
         lines = [f"fitted with {self.simulations} simulations in {self.seconds:.0f} s, {self.failed} failed"]
         mean, spread = self.samples.mean(axis=0), self.samples.std(axis=0)
         for k, name in enumerate(self.names):
+            unit = "" if self.units[k] == "1" else f" {self.units[k]}"
             lines.append(
-                f"  {name}: best fit {self.estimate[k]:.4g} ± {self.sd[k]:.2g} {self.units[k]}, "
-                f"posterior {mean[k]:.4g} ± {spread[k]:.2g}"
+                f"  {name}: best fit {self.estimate[k]:.4g} ± {self.sd[k]:.2g}{unit}, "
+                f"posterior {mean[k]:.4g} ± {spread[k]:.2g}{unit}"
             )
         lines.append(f"  noise {self.noise.sd * 1e3:.3g} mm a coordinate ({self.noise.source})")
         for name in self.at_bound:

@@ -83,8 +83,12 @@ def _diagnosed(found: Findings) -> Verdict:
         return Verdict("named", "good", _cap(f"{named} {verb} missing from the model; with it, {drop}."), detail, add)
     if result["verdict"] == "tied":
         rivals = " or ".join(words(n) for n in effects)
-        text = f"Something is missing, {rivals}; these recordings cannot tell which. The error is {before}, {floor}."
-        return Verdict("tied", "open", text, detail)
+        drop = f"The {e['on']} error is {before}, {floor}."
+        if effects and number(e["after"]) is not None:
+            drop = f"With {words(effects[0])}, the {e['on']} error falls from {before} to {after} ({floor})."
+        add = "" if found.after_inferred or not effects else f"muslin add {effects[0]} {file}"
+        missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
+        return Verdict("tied", "open", f"{missing} {drop}", detail, add)
     text = {
         "none": f"The model misses the measurement by {before} where noise is {noise}, and no candidate explains it.",
         "cannot-tell": f"The error is {before} at {floor}; these recordings cannot show what is missing.",

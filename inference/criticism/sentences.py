@@ -25,8 +25,8 @@ def explain(result: dict[str, Any], effects: dict[str, type[Effect]], evidence: 
         )
     elif verdict == "tied":
         out.append(
-            f"Tied: {' and '.join(named)} explain the misfit equally well ("
-            f"{', '.join(_share(result, n) for n in named)} of the excess), and these data cannot tell them apart. "
+            f"Tied: {' and '.join(named)}. The object {effects[named[0]].symptom}; each explains the misfit about as "
+            f"well ({'; '.join(_share(result, n) for n in named)}), and these data cannot tell them apart. "
             f"With {named[0]}, {where} {length(error['before'], error['unit'])} → "
             f"{length(error['after'], error['unit'])}, noise {length(error['noise'], error['unit'])}. "
             "A motion that excites them differently would decide: faster, at another frequency, or held still."
@@ -62,7 +62,7 @@ def explain(result: dict[str, Any], effects: dict[str, type[Effect]], evidence: 
 
 def _share(result: dict[str, Any], name: str) -> str:
     candidate = next(c for c in result["candidates"] if c["name"] == name)
-    return f"{name} {100 * candidate['explained']:.0f} %, {_coefficients(candidate)}"
+    return f"{name} {100 * candidate['explained']:.0f} % of the excess, with {_coefficients(candidate)}"
 
 
 def length(value: float, unit: str) -> str:

@@ -31,7 +31,7 @@ def test_a_plate_of_known_thickness():
 
 @pytest.mark.parametrize("poisson", [0.1, 0.4])
 def test_tensile_strip(poisson):
-    """1 % of strain, to 6 %: a strip of 4 x 12 cells comes out 4 to 5 % too soft."""
+    """1 % of strain, to 1.5 %."""
     columns, rows, width, length, strain = 5, 13, 0.05, 0.15, 0.01
     body = cloth_grid(width, length, columns, rows)
     top, bottom, middle = np.arange(columns), np.arange(-columns, 0), columns * (rows // 2)
@@ -44,8 +44,8 @@ def test_tensile_strip(poisson):
     stretch = -moved[bottom, 2].mean() / length
     narrowing = (moved[middle, 0] - moved[middle + columns - 1, 0]) / width
     # Saint Venant-Kirchhoff: force = E t w e (1 + e) (1 + e/2).
-    assert stretch * (1 + stretch) * (1 + stretch / 2) == pytest.approx(strain, rel=0.06)
-    assert narrowing / stretch == pytest.approx(poisson, rel=0.06)
+    assert stretch * (1 + stretch) * (1 + stretch / 2) == pytest.approx(strain, rel=0.015)
+    assert narrowing / stretch == pytest.approx(poisson, rel=0.03)
 
 
 def _droop(rows: int) -> float:
@@ -63,7 +63,7 @@ def _droop(rows: int) -> float:
 def test_a_cantilever_droops_more_than_an_elastica():
     """rho g L^3 / D = 7.35: 0.0616 m from the boundary value problem of the heavy elastica.
 
-    MuJoCo's bending on this mesh is too soft: 22 % more with 8 cells, 17 % with 16. It must not get worse.
+    MuJoCo's bending on this mesh is too soft: 22 % more with 8 cells, 16 % with 16. It must not get worse.
     """
     ratios = [_droop(rows) / 0.0616 for rows in (9, 17)]
     assert ratios == sorted(ratios, reverse=True)

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from mujoco_scenes import AREA, INERTIA, RHO, SHEAR, E, L, beam_sag, opened, scene, swing, timoshenko
+from mujoco_scenes import AREA, INERTIA, RHO, SHEAR, E, G, L, beam_sag, opened, scene, swing, timoshenko
 
 from muslin.backends.mujoco.model import quadratic_cells
 from muslin.core.body import solid_box
@@ -18,32 +18,44 @@ STIFFNESS = 1 / (L**3 / 3 / (E * INERTIA) + L / (5 / 6 * SHEAR * AREA))
 
 @pytest.mark.parametrize("load", [0.0, 0.052, 0.101])
 def test_beam_sag(load):
-    """Three quadratic cells sag less than Timoshenko's beam of 7.2, 22 and 35 mm: by 5 % without a load.
+    """Three quadratic cells sag less than Timoshenko's beam of 7.2, 17.5 and 27.1 mm: by 7, 7 and 10 %.
 
-    Half of that is the mesh, half the clamp, which forbids the section to narrow. With a load the sag is
-    not small, and a beam that bends far sags less.
+    Part of it is the mesh, part the clamp, which forbids the section to narrow. The larger sags are not small,
+    and a beam that bends far sags less than linear theory says.
     """
     path = beam_sag(1.5, load=load, damping_time=0.03)
-    assert np.ptp(path[-20:]) < 1e-6
-    assert 0.88 < path[-1] / timoshenko(load) < 1.0
+    assert np.ptp(path[-20:]) < 1e-5
+    assert 0.89 < path[-1] / timoshenko(load) < 0.95
 
 
-def test_small_sag_is_within_six_percent_and_nears_theory_with_the_mesh():
-    """Against Timoshenko at a hundredth of gravity: 0.79, 0.92, 0.95, 0.96 for 1 to 4 cells along the beam."""
-    scale = 0.01
+def test_small_sag_nears_theory_with_the_mesh():
+    """Against Timoshenko at a hundredth of gravity: 0.78, 0.91, 0.94, 0.945 for 1 to 4 cells along the beam."""
     ratios = [
-        beam_sag(1.0, gravity=scale * 9.80665, damping_time=0.03, counts=(n, 3, 3))[-1] / scale / timoshenko(0.0)
-        for n in (3, 5, 7, 9)
+        beam_sag(1.0, gravity=0.01 * G, damping_time=0.03, counts=(2 * cells + 1, 3, 3))[-1] / 0.01 / timoshenko(0.0)
+        for cells in (1, 2, 3, 4)
     ]
     assert ratios == sorted(ratios)
-    assert 0.94 < ratios[2] < ratios[3] < 1.0
+    assert 0.93 < ratios[2] < ratios[3] < 0.96
+
+
+@pytest.mark.slow
+def test_small_sag_on_a_fine_mesh():
+    """5 x 2 x 2 cells with much damping: 0.96, and MuJoCo's solver does not give up."""
+    path = beam_sag(1.0, gravity=0.01 * G, damping_time=0.03, counts=(11, 5, 5))
+    assert 0.95 < path[-1] / 0.01 / timoshenko(0.0) < 1.0
+
+
+def test_damping_does_not_move_where_the_beam_comes_to_rest():
+    """It would if the held vertices yielded within the step."""
+    sags = [beam_sag(2.0, damping_time=beta)[-1] for beta in (0.005, 0.03)]
+    assert sags[1] == pytest.approx(sags[0], rel=1e-4)
 
 
 def test_linear_tetrahedra_are_too_stiff_in_bending():
-    """What the docstring warns of: even vertex counts fall back to them, and the beam sags far too little."""
+    """What the docstring warns of: even vertex counts fall back to them, and the beam sags 0.6 times as far."""
     assert quadratic_cells(solid_box(np.zeros(3), np.ones(3), (7, 4, 4))) is None
     assert quadratic_cells(solid_box(np.zeros(3), np.ones(3), (7, 3, 5))) == (3, 1, 2)
-    assert beam_sag(1.0, damping_time=0.03, counts=(7, 4, 4))[-1] < 0.8 * timoshenko(0.0)
+    assert 0.55 < beam_sag(1.0, damping_time=0.03, counts=(7, 4, 4))[-1] / timoshenko(0.0) < 0.65
 
 
 @pytest.mark.parametrize("load", [0.0, 0.052, 0.101])

@@ -1,0 +1,53 @@
+"""Gravity turned by the angles it says."""
+
+import numpy as np
+import pytest
+from effect_objects import SHEET, G, vertices
+from hypothesis import given
+from hypothesis import strategies as st
+
+from muslin.core.body import cloth_grid
+from muslin.core.material import ClothMaterial
+from muslin.plugins.effects.gravity import GravityTilt
+
+DOWN = np.array([0.0, 0.0, -G])
+angles = st.floats(-3.0, 3.0)
+
+
+@given(angles, angles)
+def test_keeps_the_strength_and_turns_by_the_angles(a, b):
+    """About x and then y: the angle to the vertical has the cosine cos a cos b."""
+    turned = GravityTilt(about_x=a, about_y=b).on_gravity(DOWN)
+    assert np.linalg.norm(turned) == pytest.approx(G, rel=1e-12)
+    assert turned @ DOWN / G**2 == pytest.approx(np.cos(a) * np.cos(b), abs=1e-12)
+
+
+def test_signs_follow_the_right_hand():
+    """About x by +a, down (-z) turns towards +y; about y by +b towards -x."""
+    about_x = GravityTilt(about_x=0.02).on_gravity(DOWN)
+    np.testing.assert_allclose(about_x, [0.0, G * np.sin(0.02), -G * np.cos(0.02)], atol=1e-12)
+    about_y = GravityTilt(about_y=0.02).on_gravity(DOWN)
+    np.testing.assert_allclose(about_y, [-G * np.sin(0.02), 0.0, -G * np.cos(0.02)], atol=1e-12)
+
+
+def test_leaves_its_argument_alone():
+    gravity = DOWN.copy()
+    GravityTilt(about_x=0.5).on_gravity(gravity)
+    np.testing.assert_array_equal(gravity, DOWN)
+
+
+def test_a_free_body_falls_along_it():
+    effect = GravityTilt(about_x=0.05, about_y=-0.03)
+    moved = vertices(SHEET, ClothMaterial(), [0.0, 0.3], effect)[1] - SHEET.vertices
+    along = effect.on_gravity(DOWN)
+    np.testing.assert_allclose(moved, np.tile(along * 0.15 * 0.305, (len(moved), 1)), rtol=1e-8)
+
+
+@pytest.mark.parametrize("angle", [-0.05, 0.03])
+def test_a_hanging_strip_leans_by_the_angle(angle):
+    body = cloth_grid(0.02, 0.1, 2, 5)
+    material = ClothMaterial(stretch_stiffness=300.0, bending_rigidity=1e-3)
+    effect = GravityTilt(about_x=angle)
+    hanging = vertices(body, material, [0.0, 0.01], effect, grasps=([0, 1],), settle=2.5)[0]
+    tip = hanging[-2:].mean(axis=0)
+    assert np.arctan2(tip[1], -tip[2]) == pytest.approx(angle, rel=1e-2)
