@@ -157,7 +157,7 @@ def errors(found: Findings) -> Table:
     floors = (number(said.get("noise")), noise, number(fitted.get("sd")))
     out["noise"] = next((n for n in floors if n is not None), None)
     out["before"], out["after"] = mean, None
-    named = (found.diagnose or {}).get("verdict") == "named"
+    named = (found.diagnose or {}).get("verdict") in ("named", "tied")
     if found.after_inferred:
         out["after"] = _root_mean([t.rmse_after for t in takes])
     elif said:

@@ -17,8 +17,8 @@ PLATE_DRAG = 1.17
 class AirDrag(Effect):
     """Drag and lift of still air, per triangle: see :func:`~.surface.plate_force`.
 
-    C_D of a plate is 1.1 to 1.3, less if the cloth is porous. C_L is bounded by C_D for a force that
-    always opposes the motion.
+    C_D of a plate is 1.1 to 1.3, less if the cloth is porous. The power is that of the drag alone, never
+    positive; with C_L above C_D the air would still push a triangle forward along its own plane.
     """
 
     name: ClassVar[str] = "air-drag"

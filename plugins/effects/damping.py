@@ -35,8 +35,9 @@ class ViscousDamping(Effect):
 class InternalDamping(Effect):
     """Stiffness-proportional damping, C = beta K: a mode of angular frequency w decays at beta w^2 / 2.
 
-    It acts on deformation only, never on rigid motion. The backends have it natively, as the damping
-    time of the material; this effect adds to that time.
+    The beta of Rayleigh damping C = alpha M + beta K (Rayleigh 1877, The Theory of Sound, I.81). It acts on
+    deformation only, never on rigid motion. The backends have it natively, as the damping time of the
+    material; this effect adds to that time.
     """
 
     name: ClassVar[str] = "internal-damping"

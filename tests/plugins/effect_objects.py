@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.effect import Effect, NodalForce
@@ -19,6 +20,8 @@ from muslin.core.simulator import Simulator
 G = STANDARD_GRAVITY
 SHEET = cloth_grid(0.2, 0.1, 5, 4)
 BLOCK = solid_box(np.zeros(3), np.array([0.1, 0.2, 0.3]), (3, 3, 3))
+#: For hypothesis: the same cases every time, however busy the machine.
+cases = settings(max_examples=60, deadline=None, derandomize=True)
 EFFECTS = ("actuator-lag", "air-drag", "gravity-tilt", "internal-damping", "viscous-damping", "wind")
 
 

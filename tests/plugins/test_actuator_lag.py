@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effect_objects import engine
+from effect_objects import cases, engine
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -54,6 +54,7 @@ def test_step_response(tau):
     assert (got >= 1 - np.exp(-(times - STEP) / tau) - 1e-15).all()
 
 
+@cases
 @given(st.floats(1e-4, 0.1), st.lists(st.floats(-1.0, 1.0), min_size=2, max_size=12))
 def test_never_leaves_the_range_of_the_command_and_arrives(tau, places):
     """A first-order lag does not overshoot; ten tau after the last command it is there to exp(-10)."""

@@ -1,7 +1,6 @@
 """What every shipped effect declares and keeps."""
 
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -9,8 +8,11 @@ from effect_objects import EFFECTS, engine
 
 from muslin.core.effect import Effect
 from muslin.core.errors import InputError
+from muslin.core.material import ClothMaterial
+from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
 from muslin.core.testing import check_effect
+from muslin.plugins.effects.surface import plate_force
 
 DECLARED = {
     "actuator-lag": ("command", {"time_constant": "s"}),
@@ -68,20 +70,15 @@ def test_is_documented(name):
 
 @pytest.mark.parametrize("name", ["air-drag", "wind", "viscous-damping", "internal-damping"])
 def test_a_law_of_nature_names_its_source(name):
-    """Author and year, in the module or in the function that has the law."""
-    effect = REGISTRY.get("effect", name)
-    from muslin.plugins.effects.surface import plate_force
-
-    texts = [effect.__doc__, sys.modules[effect.__module__].__doc__]
-    if "plate" in effect.__doc__.lower():
-        texts.append(plate_force.__doc__)
-    assert any(re.search(r"[A-Z][a-z]+.*\b1[89]\d\d|[A-Z][a-z]+.*\b20\d\d", text, re.S) for text in texts)
+    """Author and year, in the docstring of the effect or of the plate law that it refers to."""
+    text = REGISTRY.get("effect", name).__doc__
+    if "plate" in text.lower():
+        text += plate_force.__doc__
+    assert re.search(r"[A-Z][a-z]+[^.]*\b(18|19|20)\d\d\b", text)
 
 
 def test_no_effect_reaches_another_place_than_it_declares():
     """The hooks of other places are the identity."""
-    from muslin.core.material import ClothMaterial
-    from muslin.core.motion import Motion
 
     gravity, material, motion = (
         np.array([0.0, 0.0, -9.8]),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from effect_objects import SHEET, G, vertices
+from effect_objects import SHEET, G, cases, vertices
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +14,7 @@ DOWN = np.array([0.0, 0.0, -G])
 angles = st.floats(-3.0, 3.0)
 
 
+@cases
 @given(angles, angles)
 def test_keeps_the_strength_and_turns_by_the_angles(a, b):
     """About x and then y: the angle to the vertical has the cosine cos a cos b."""
