@@ -77,3 +77,5 @@ class Simulator(ABC):
             raise InputError(
                 f"simulator {self.name!r} has no {scene.body.kind}; it has {', '.join(sorted(self.object_kinds))}"
             )
+        if scene.material.kind != scene.body.kind:
+            raise InputError(f"a {scene.body.kind} cannot be made of a {scene.material.kind} material")

@@ -6,7 +6,7 @@ import importlib.util
 from functools import cache
 from typing import Any
 
-from ...core.errors import InputError
+from ...core.errors import BrokenPluginError
 
 _ADDRESS, _REAL, _INT, _TEXT = ctypes.c_void_p, ctypes.c_double, ctypes.c_int, ctypes.c_char_p
 _HOW_TO_GET_IT = "install it with `pip install muslin[pybullet]`"
@@ -57,18 +57,18 @@ def bullet() -> ctypes.PyDLL:
     interpreter lock, so two threads are never inside Bullet at once; its allocator and profiler are global.
 
     Raises:
-        InputError: pybullet is not installed, or is a build that does not export its C API.
+        BrokenPluginError: pybullet is not installed, or is a build that does not export its C API.
     """
     spec = importlib.util.find_spec("pybullet")
     if spec is None or spec.origin is None:
-        raise InputError(f"simulator 'pybullet' needs the package pybullet, which is not installed; {_HOW_TO_GET_IT}")
+        raise BrokenPluginError(f"simulator 'pybullet' needs the package pybullet, which is not installed; {_HOW_TO_GET_IT}")
     try:
         library = ctypes.PyDLL(spec.origin)
         for name, result, arguments in _FUNCTIONS:
             function = getattr(library, name)
             function.restype, function.argtypes = result, arguments
     except (OSError, AttributeError) as problem:
-        raise InputError(
+        raise BrokenPluginError(
             f"simulator 'pybullet' needs Bullet's C API, which {spec.origin} does not offer ({problem}); "
             f"{_HOW_TO_GET_IT}"
         ) from problem
@@ -79,11 +79,11 @@ def version() -> str:
     """Name and version of the engine.
 
     Raises:
-        InputError: pybullet is not installed.
+        BrokenPluginError: pybullet is not installed.
     """
     try:
         return f"pybullet {importlib.metadata.version('pybullet')}"
     except importlib.metadata.PackageNotFoundError as problem:
-        raise InputError(
+        raise BrokenPluginError(
             f"simulator 'pybullet' needs the package pybullet, which is not installed; {_HOW_TO_GET_IT}"
         ) from problem

@@ -49,17 +49,7 @@ def scenario(body: Body, motion: Motion, times: Any, grasps: tuple[Any, ...] = (
     )
 
 
-def extremes(time_step: float, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times and values of the turning points of a sampled oscillation, by parabolas through three samples."""
-    turn = np.flatnonzero(np.diff(path[:-1]) * np.diff(path[1:]) < 0) + 1
-    a, b, c = path[turn - 1], path[turn], path[turn + 1]
-    offset = 0.5 * (a - c) / (a - 2 * b + c)
-    return time_step * (turn + offset), b - 0.25 * (a - c) * offset
-
-
-def frequency_and_decay(time_step: float, path: np.ndarray) -> tuple[float, float]:
-    """Angular frequency [rad/s] and rate of decay [1/s] of a sampled damped oscillation about any level."""
-    when, what = extremes(time_step, path)
-    swings = np.abs(np.diff(what))
-    rate = -np.polyfit(0.5 * (when[1:] + when[:-1]), np.log(swings), 1)[0]
-    return float(np.pi / np.median(np.diff(when))), float(rate)
+def rising_zeros(time_step: float, path: np.ndarray) -> np.ndarray:
+    """Times at which a sampled oscillation about zero passes it upwards."""
+    up = np.flatnonzero((path[:-1] < 0) & (path[1:] >= 0))
+    return time_step * (up + path[up] / (path[up] - path[up + 1]))

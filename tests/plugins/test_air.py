@@ -180,3 +180,7 @@ def test_wind_pushes_a_sheet_at_rest_downwind():
     np.testing.assert_allclose(across.sum(axis=0), expected, rtol=1e-12)
     along = bound(Wind(velocity_x=-1.5), body)(0.0, body.vertices, moving(body, [0, 0, 0]))
     np.testing.assert_allclose(along, 0.0, atol=1e-15)
+
+
+def test_density_of_air_is_that_of_an_ideal_gas_at_20_degrees():
+    assert pytest.approx(101325 * 0.0289647 / (8.314462618 * 293.15), rel=1e-3) == AIR_DENSITY
