@@ -61,7 +61,9 @@ def bullet() -> ctypes.PyDLL:
     """
     spec = importlib.util.find_spec("pybullet")
     if spec is None or spec.origin is None:
-        raise BrokenPluginError(f"simulator 'pybullet' needs the package pybullet, which is not installed; {_HOW_TO_GET_IT}")
+        raise BrokenPluginError(
+            f"simulator 'pybullet' needs the package pybullet, which is not installed; {_HOW_TO_GET_IT}"
+        )
     try:
         library = ctypes.PyDLL(spec.origin)
         for name, result, arguments in _FUNCTIONS:

@@ -16,7 +16,7 @@ from pybullet_scenes import NOWHERE, SMALL_CLOTH, opened, scene
 
 from muslin.backends.pybullet import PybulletSimulator, library
 from muslin.core.body import Body, cloth_grid, solid_box
-from muslin.core.errors import InputError, RolloutFailed
+from muslin.core.errors import BrokenPluginError, InputError, RolloutFailed
 from muslin.core.material import ClothMaterial, SolidMaterial
 
 
@@ -60,7 +60,7 @@ def test_missing_engine_is_explained(monkeypatch):
     monkeypatch.setattr(library.importlib.util, "find_spec", lambda name: None)
     library.bullet.cache_clear()
     try:
-        with pytest.raises(InputError, match=r"pip install muslin\[pybullet\]"):
+        with pytest.raises(BrokenPluginError, match=r"pip install muslin\[pybullet\]"):
             PybulletSimulator().open(scene(SMALL_CLOTH, ClothMaterial()))
     finally:
         library.bullet.cache_clear()
