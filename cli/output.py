@@ -1,10 +1,9 @@
-"""Files that commands write: checked before the work starts, and whole or absent."""
+"""Files that commands write: checked before the work starts."""
 
 import os
 from pathlib import Path
 
 from ..core.errors import InputError, MissingFileError
-from ..core.store import storage_errors
 
 
 def check_output(path: Path, force: bool) -> None:
@@ -18,14 +17,3 @@ def check_output(path: Path, force: bool) -> None:
         raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
     if not os.access(parent, os.W_OK):
         raise InputError(f"no permission to write in {parent}")
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file beside its place and move it there, so that a full disk leaves nothing."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    with storage_errors(path):
-        try:
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)

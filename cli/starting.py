@@ -13,9 +13,10 @@ from ..core.measurement import Measurement
 from ..core.measurement_store import load_measurement
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
+from ..core.store import write_text
 from ..core.study import build_problem, parse_config
 from .console import next_step, say
-from .output import check_output, write_whole
+from .output import check_output
 from .placing import parse_markers, place_markers
 from .study_file import Plan, study_text
 
@@ -92,7 +93,7 @@ def new(
     plan, remarks = place_markers(plan, measured, str(study))
     text = study_text(plan)
     build_problem(parse_config(tomllib.loads(text), str(study)), measured)
-    write_whole(study, text)
+    write_text(study, text)
     say(f"wrote {study}: fits {base.kind} {scenario!r} on {', '.join(fitted)}")
     if held:
         say(f"  held out: {', '.join(held)}")

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 
 from ..core.errors import InputError
+from ..core.store import write_text
 from ..core.study import Study
 from .console import ProgressView, next_step, say
-from .output import check_output, write_whole
+from .output import check_output
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
 Workers = Annotated[
@@ -68,7 +69,7 @@ def diagnose(
     say(result.text())
     verdict = result.to_json()
     if json_file is not None:
-        write_whole(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
+        write_text(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:

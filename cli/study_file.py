@@ -166,7 +166,7 @@ constant_offset = 0.0  # of the frame of the points [m]
 [diagnose]
 # Which effects to try; left out, every one that fits the object.
 # candidates = {_value(REGISTRY.names("effect"))}
-draws = {default.draws}  # simulations for the scatter that the posterior allows
+draws = {default.draws}  # starting points that are tried for each effect
 """
 
 

@@ -29,7 +29,7 @@ class Effect(ABC):
     name: ClassVar[str]
     #: Coefficients with their unit and prior range. The range must contain zero or touch it.
     coefficients: ClassVar[tuple[Parameter, ...]]
-    #: What it acts on, for people: "force", "material", "gravity", "command" or "observation".
+    #: What it acts on, for people: "force", "material", "gravity" or "command".
     acts_on: ClassVar[str]
     #: Kinds of body for which it is meaningful.
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
@@ -62,7 +62,7 @@ class Effect(ABC):
         return gravity
 
     def on_command(self, motion: Motion, time_step: float) -> Motion:
-        """The motion that the grippers really make when told ``motion``; may resample at ``time_step`` [s]."""
+        """The motion that the grippers really make when told ``motion``; may resample it at ``time_step`` [s]."""
         return motion
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:

@@ -12,6 +12,9 @@ def _check(material: "Material") -> None:
         value = getattr(material, f.name)
         if not value >= 0 or value == float("inf"):
             raise InputError(f"material: {f.name} must be finite and not negative, but is {value!r}")
+    for name in ("areal_density", "density", "stretch_stiffness", "youngs_modulus"):
+        if getattr(material, name, 1.0) <= 0:
+            raise InputError(f"material: {name} must be above zero, but is {getattr(material, name)!r}")
     if material.poisson_ratio >= 0.5:
         raise InputError(f"material: poisson_ratio must be below 0.5, but is {material.poisson_ratio:g}")
 

@@ -1,8 +1,7 @@
 """Measurements: one object, several recordings of it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-
-import numpy as np
 
 from .errors import InputError
 from .motion import Motion
@@ -74,12 +73,15 @@ class Measurement:
                 return r
         raise InputError(f"no recording {name!r} in this measurement; it has {', '.join(self.names)}")
 
-    def point_count(self) -> int:
-        return max(int(r.series.points.shape[1]) for r in self.recordings)
 
-    def repeats(self) -> dict[str, list[Recording]]:
-        """Recordings grouped by motion and load."""
-        groups: dict[str, list[Recording]] = {}
-        for r in self.recordings:
-            groups.setdefault(f"{r.motion}|{np.round(r.load, 6)}", []).append(r)
-        return groups
+def repeats(recordings: Iterable[Recording]) -> list[tuple[Recording, Recording]]:
+    """Pairs of takes of the same motion under the same load, with the same corresponding points."""
+    takes = [r for r in recordings if r.series.correspondence]
+    return [
+        (a, b)
+        for i, a in enumerate(takes)
+        for b in takes[i + 1 :]
+        if a.motion == b.motion
+        and abs(a.load - b.load) < 1e-6
+        and a.series.points.shape[1:] == b.series.points.shape[1:]
+    ]

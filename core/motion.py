@@ -6,6 +6,7 @@ import numpy as np
 
 from .arrays import FloatArray
 from .errors import InputError
+from .interpolation import interpolate
 
 IDENTITY_POSE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -61,13 +62,10 @@ class Motion:
 
     def at(self, times: FloatArray) -> FloatArray:
         """Poses ``(T, G, 7)`` at ``times (T,)`` [s]; positions linear, quaternions along the chord."""
-        if len(self.times) == 1:
-            return np.repeat(self.poses, len(times), axis=0)
-        right = np.clip(np.searchsorted(self.times, times, side="right"), 1, len(self.times) - 1)
-        span = self.times[right] - self.times[right - 1]
-        share = np.clip((times - self.times[right - 1]) / span, 0.0, 1.0)[:, None, None]
-        a, b = self.poses[right - 1], self.poses[right].copy()
-        b[..., 3:] *= np.where(np.sum(a[..., 3:] * b[..., 3:], axis=-1, keepdims=True) < 0, -1.0, 1.0)
-        out = a + share * (b - a)
+        turned = self.poses.copy()
+        # q and -q are the same turn: keep to one side, or the chord goes the long way round
+        flips = np.sum(turned[1:, :, 3:] * turned[:-1, :, 3:], axis=-1) < 0
+        turned[1:, :, 3:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[..., None]
+        out = interpolate(times, self.times, turned)
         out[..., 3:] /= np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
         return np.asarray(out)

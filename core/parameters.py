@@ -1,6 +1,6 @@
 """Parameters with units and bounds, and the unit cube that estimators see."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -104,9 +104,3 @@ class ParameterSpace:
 
     def as_dict(self, values: FloatArray | Sequence[float]) -> dict[str, float]:
         return {n: float(v) for n, v in zip(self.names, np.asarray(values, float), strict=True)}
-
-    def as_vector(self, values: Mapping[str, float]) -> FloatArray:
-        missing = [n for n in self.names if n not in values]
-        if missing:
-            raise InputError(f"no value for parameter {', '.join(missing)}")
-        return np.array([float(values[n]) for n in self.names])

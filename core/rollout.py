@@ -1,13 +1,14 @@
 """The shared effect loop: one rollout of any simulator with any effects."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .arrays import FloatArray
 from .effect import Effect
 from .errors import RolloutFailed
+from .interpolation import interpolate
 from .material import Material
 from .scenario import STANDARD_GRAVITY, Scenario
 from .series import PointSeries
@@ -17,6 +18,8 @@ from .simulator import Simulator
 LARGEST_STRETCH = 3.0
 #: Rate of the artificial damping while an object comes to rest before the first observation [1/s].
 SETTLE_RATE = 8.0
+#: Step at which an effect may resample a command [s].
+COMMAND_STEP = 0.002
 _CHECK_EVERY = 10
 
 
@@ -45,7 +48,8 @@ def rollout(
     """Simulate ``scenario`` once.
 
     Effects that are off are left out altogether, so a coefficient of zero gives the plain trajectory
-    bit for bit. Observations between two steps are interpolated linearly.
+    bit for bit. The object starts where the grippers really are, after what effects make of their
+    command. Observations between two steps are interpolated linearly.
 
     Raises:
         RolloutFailed: the engine failed, a position is not finite, or an edge is stretched beyond
@@ -55,20 +59,18 @@ def rollout(
     gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
     for effect in active:
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
+        scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
     scene = scenario.scene(material, gravity, scale)
     simulator.check(scene)
     world = simulator.open(scene)
     try:
         dt = world.time_step
-        motion = scenario.motion
-        for effect in active:
-            motion = effect.on_command(motion, dt)
         forces = [f for f in (e.bind(scene, world.masses) for e in active) if f is not None]
         settle_steps = int(np.ceil(scenario.settle / dt - 1e-9))
         start, end = scenario.times[0], scenario.times[-1]
         steps = int(np.ceil((end - start) / dt - 1e-9))
         clock = start + dt * np.arange(-settle_steps, steps + 1)
-        held = scenario.held_positions(motion, np.maximum(clock, start), scene.body.vertices)
+        held = scenario.held_positions(np.maximum(clock, start), scene.body.vertices)
         rest = scene.body.edge_lengths(scene.body.vertices)
         path = np.empty((steps + 1, len(scene.body.vertices), 3))
         for k, time in enumerate(clock):
@@ -89,9 +91,9 @@ def rollout(
             world.step(held[k + 1], total)
     finally:
         world.close()
-    vertices = _interpolate(clock[settle_steps:], path, scenario.times)
+    vertices = interpolate(scenario.times, clock[settle_steps:], path)
     points = np.einsum("mv,tva->tma", scenario.markers, vertices)
-    return Trajectory(PointSeries(scenario.times, points), vertices, motion.at(scenario.times))
+    return Trajectory(PointSeries(scenario.times, points), vertices, scenario.motion.at(scenario.times))
 
 
 def _check(lengths: FloatArray, rest: FloatArray, time: float) -> None:
@@ -100,11 +102,3 @@ def _check(lengths: FloatArray, rest: FloatArray, time: float) -> None:
         raise RolloutFailed(f"positions are not finite at {time:.3f} s")
     if worst > LARGEST_STRETCH:
         raise RolloutFailed(f"an edge is stretched {worst:.1f} times at {time:.3f} s")
-
-
-def _interpolate(clock: FloatArray, path: FloatArray, times: FloatArray) -> FloatArray:
-    if len(clock) == 1:
-        return np.repeat(path, len(times), axis=0)
-    right = np.clip(np.searchsorted(clock, times, side="right"), 1, len(clock) - 1)
-    share = ((times - clock[right - 1]) / (clock[right] - clock[right - 1])).clip(0, 1)[:, None, None]
-    return np.asarray(path[right - 1] + share * (path[right] - path[right - 1]))

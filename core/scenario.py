@@ -62,7 +62,7 @@ class Scenario:
         if self.load > 0 and not len(self.load_vertices):
             raise InputError(f"scenario {self.name!r} says nowhere to hang a load of {self.load:g} kg")
 
-    def for_recording(self, recording: Recording, frames: slice = slice(None)) -> "Scenario":
+    def for_recording(self, recording: Recording) -> "Scenario":
         """The same object under a recording's motion, load and observation times."""
         motion = recording.gripper if recording.gripper is not None else self.motion
         if motion.grippers < len(self.grasps):
@@ -70,7 +70,7 @@ class Scenario:
                 f"recording {recording.name!r} has poses of {motion.grippers} grippers, "
                 f"but scenario {self.name!r} holds the object with {len(self.grasps)}"
             )
-        return replace(self, motion=motion, times=recording.series.time[frames], load=recording.load)
+        return replace(self, motion=motion, times=recording.series.time, load=recording.load)
 
     @property
     def held(self) -> IntArray:
@@ -89,14 +89,14 @@ class Scenario:
             loads[self.load_vertices] = self.load / len(self.load_vertices)
         return Scene(body, material, gravity, self.held, loads, self.table_height)
 
-    def held_positions(self, motion: Motion, times: FloatArray, vertices: FloatArray) -> FloatArray:
-        """Where the held vertices must be ``(T, H, 3)`` [m] when the grippers follow ``motion``.
+    def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
+        """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].
 
         Args:
             vertices: world positions at the start ``(V, 3)``, from :meth:`world_vertices`.
         """
-        start = motion.at(self.times[:1])[0]
-        poses = motion.at(times)
+        start = self.motion.at(self.times[:1])[0]
+        poses = self.motion.at(times)
         parts = []
         for g, ids in enumerate(self.grasps):
             local = rotate(inverse(start[g, 3:]), vertices[ids] - start[g, :3])

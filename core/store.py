@@ -60,6 +60,19 @@ def new_store(path: Path, *, overwrite: bool = False) -> Iterator[zarr.Group]:
             shutil.rmtree(partial, ignore_errors=True)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write a text file beside its place and move it there: whole or absent, also on a full disk."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    with storage_errors(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(path)
+        finally:
+            with contextlib.suppress(OSError):
+                partial.unlink(missing_ok=True)
+
+
 def open_store(path: Path, mode: str = "r") -> zarr.Group:
     """Open an existing store; ``mode`` is ``"r"`` or ``"r+"``."""
     if not path.exists():

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import zarr
 
-from ..core.arrays import FloatArray
+from ..core.arrays import FloatArray, IntArray
 from ..core.errors import StoreError
 from ..core.rollout import Trajectory
 from ..core.store import empty_draws, put, storage_errors
@@ -30,22 +30,22 @@ class DrawStore:
     def __init__(self, study: Study, problem: Problem, count: int) -> None:
         self._path = study.results_path
         self._recordings = list(problem.fit_on)
-        fingerprint = study.fingerprint()
+        made_with = {"fingerprint": study.fingerprint(), "engine": problem.simulator.engine_version()}
         found = study.results("r+").get("fit")
-        if isinstance(found, zarr.Group) and found.attrs.get("fingerprint") not in (None, fingerprint):
+        if isinstance(found, zarr.Group) and any(found.attrs.get(k) not in (None, v) for k, v in made_with.items()):
             study.progress(f"the study has changed; its earlier results are kept in {study.set_aside()}", 0, 0)
             found = None
         fit = found if isinstance(found, zarr.Group) and "fingerprint" in found.attrs else None
         if fit is None:
             with storage_errors(self._path):
-                fit = self._create(study.results("r+"), problem, count, fingerprint)
+                fit = self._create(study.results("r+"), problem, count, made_with)
         self.group: zarr.Group = fit
         self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
         self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
         self.status = np.asarray(self._draws["status"][...])
 
     @staticmethod
-    def _create(root: zarr.Group, problem: Problem, count: int, fingerprint: dict[str, Any]) -> zarr.Group:
+    def _create(root: zarr.Group, problem: Problem, count: int, made_with: dict[str, Any]) -> zarr.Group:
         fit = root.create_group("fit", overwrite=True)
         draws = fit.create_group("draws")
         draws.attrs["parameters"] = list(problem.space.names)
@@ -59,7 +59,7 @@ class DrawStore:
             empty_draws(draws, _array(name), shape, dims, series.unit, "float32", np.nan)
         empty_draws(draws, "status", (count,), ["draw"], "1", "int8", ABSENT)
         fit.attrs["failures"] = {}
-        fit.attrs["fingerprint"] = fingerprint  # last: a store without it is made anew
+        fit.attrs.update(made_with)  # last: a store without it is made anew
         return fit
 
     def write(self, draw: int, theta: FloatArray, outcomes: Mapping[str, Outcome]) -> None:
@@ -84,14 +84,14 @@ class DrawStore:
         """Reasons of the draws that failed."""
         return list(self._failures().values())
 
-    def read(self, upto: int) -> tuple[FloatArray, list[FloatArray], FloatArray]:
+    def read(self, upto: int) -> tuple[FloatArray, list[FloatArray], IntArray]:
         """Whole draws among the first ``upto``: unit parameters, points a recording, and their numbers."""
         if (self.status[:upto] == ABSENT).any():
             raise StoreError(f"{self._path}: a draw of an earlier round is missing")
         whole = np.flatnonzero(self.status[:upto] == WHOLE)
         theta = np.asarray(self._draws["theta"][:upto])[whole]
         points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self._recordings]
-        return theta, points, whole.astype(float)
+        return theta, points, whole
 
 
 def _array(recording: str) -> str:

@@ -3,15 +3,17 @@
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..core.arrays import FloatArray
+from ..core.arrays import FloatArray, IntArray
 from ..core.errors import InputError, MuslinError
 from ..core.estimator import Posterior, PosteriorEstimator
+from ..core.measurement import Recording
 from ..core.parameters import ParameterSpace
 from ..core.registry import REGISTRY
 from ..core.series import PointSeries
@@ -39,6 +41,9 @@ class FitResult:
         samples: posterior draws ``(S, D)`` [units].
         noise: of the measurement.
         at_bound: parameters whose posterior is piled on a bound of the prior.
+        simulations: rollouts, the polish included.
+        failed: draws that could not be simulated.
+        seconds: of the run that finished the fit.
     """
 
     names: tuple[str, ...]
@@ -82,6 +87,7 @@ def fit(study: Study) -> FitResult:
     problem, config = study.problem, study.config
     rounds, per_round = config.estimator.rounds, config.estimator.draws
     noise = estimate_noise(problem, config.noise.sd)
+    _estimator(study, [problem.recordings[r] for r in problem.fit_on])  # a wrong name or option is said now
     store = DrawStore(study, problem, rounds * per_round)
     if store.group.attrs.get("finished"):
         return load_fit(study)
@@ -115,7 +121,8 @@ def fit(study: Study) -> FitResult:
         simulations = rounds * per_round * len(problem.fit_on) + pool.count - before
     samples = density[-1].sample(SAMPLES, np.random.default_rng([config.study.seed, rounds]))
     estimate = units.from_unit(best.unit)
-    sd = physical_sd(units, best.unit, best.covariance)
+    # what the model leaves unexplained makes the estimate that much less certain
+    sd = physical_sd(units, best.unit, best.covariance) * np.sqrt(max(1.0, best.rss / best.count))
     near = ((samples < 0.02) | (samples > 0.98)).mean(axis=0) > AT_BOUND
     near |= (best.unit < 0.01) | (best.unit > 0.99)
     with storage_errors(study.results_path):
@@ -181,22 +188,27 @@ def _train(
     observer: Observer,
     theta: FloatArray,
     points: list[FloatArray],
-    numbers: FloatArray,
+    numbers: IntArray,
     proposals: list[Posterior],
     round_number: int,
 ) -> Posterior:
-    table = study.config.estimator
-    options = dict(table.options)
-    if not all(r.series.correspondence for r in observer.recordings):
-        options.setdefault("correspondence", False)
-    try:
-        estimator: PosteriorEstimator = REGISTRY.get("estimator", table.name)(**options)
-    except TypeError as error:
-        raise InputError(f"[estimator] {table.name!r} does not take these options: {error}") from error
+    estimator = _estimator(study, observer.recordings)
     flawed = observer.observe(points, numbers, study.config.study.seed)
     weights = log_weights(theta, proposals) if proposals else None
     estimator.fit(theta, flawed, log_weights=weights, seed=study.config.study.seed + round_number)
     return estimator.posterior(observer.measured())
+
+
+def _estimator(study: Study, recordings: Sequence[Recording]) -> PosteriorEstimator:
+    table = study.config.estimator
+    options = dict(table.options)
+    if not all(r.series.correspondence for r in recordings):
+        options.setdefault("correspondence", False)
+    try:
+        made: PosteriorEstimator = REGISTRY.get("estimator", table.name)(**options)
+    except TypeError as error:
+        raise InputError(f"[estimator] {table.name!r} does not take these options: {error}") from error
+    return made
 
 
 def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:

@@ -7,7 +7,8 @@ import numpy as np
 
 from ..core.arrays import FloatArray
 from ..core.errors import InputError
-from ..core.measurement import Recording
+from ..core.interpolation import interpolate
+from ..core.measurement import Recording, repeats
 from ..core.study import Problem
 
 #: Largest clock offset between repeats that is looked for [s].
@@ -44,9 +45,9 @@ class Noise:
 def estimate_noise(problem: Problem, told: float | None) -> Noise:
     """The noise of a study's recordings.
 
-    Told by the study, else from repeats of the same motion (their difference is pure noise, take to
-    take variation of the object included), else from the fourth difference in time, to which a smooth
-    motion gives next to nothing.
+    Told by the study, else from repeats of the same motion, held-out takes among them (their difference
+    is pure noise, take to take variation of the object included), else from the fourth difference in
+    time, to which a smooth motion gives next to nothing.
 
     Raises:
         InputError: recordings too short or too sparse for an estimate.
@@ -55,27 +56,27 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
     unit = recordings[0].series.unit
     if told is not None:
         return Noise(told, 0.0, "given in the study", unit, 0.02)
-    pairs = [
-        (a, b)
-        for i, a in enumerate(recordings)
-        for b in recordings[i + 1 :]
-        if a.motion == b.motion and a.load == b.load and a.series.correspondence
-    ]
-    if pairs:
-        differences = [_difference(a, b) for a, b in pairs]
-        sd = float(np.sqrt(np.nanmean(np.concatenate([d.ravel() ** 2 for d in differences])) / 2.0))
-        ar1 = float(np.clip(np.mean([_lag_one(d) for d in differences]), 0.0, 0.98))
-        count = sum(int(np.isfinite(d).sum()) for d in differences) * (1 - ar1) / (1 + ar1)
-        return Noise(sd, ar1, f"{len(pairs)} pair(s) of repeats", unit, float(1 / np.sqrt(2 * max(count, 1.0))))
-    roughness = np.concatenate([_fourth_difference(r) for r in recordings])
-    if len(roughness) < 20:
-        raise InputError(
-            "the noise cannot be estimated from so few frames; give it in the study: [noise] sd = 0.003 (in metres)"
-        )
-    sd = float(1.4826 * np.median(np.abs(roughness)))
+    pairs = repeats(recordings)
+    estimates = [e for e in (_from_repeats(a, b) for a, b in pairs) if e is not None]
+    if estimates:
+        variance, ar1, count = (np.array(x) for x in zip(*estimates, strict=True))
+        sd = float(np.sqrt(np.average(variance, weights=count)))
+        correlation = float(np.clip(np.average(ar1, weights=count), 0.0, 0.98))
+        takes = len({r.name for pair in pairs for r in pair})
+        independent = count.sum() * min(1.0, takes / 2 / len(pairs)) * (1 - correlation) / (1 + correlation)
+        source = f"{takes} takes that are repeats"
+        error = float(1 / np.sqrt(2 * max(independent, 1.0)))
+    else:
+        rough = np.concatenate([_fourth_difference(r) for r in recordings])
+        if len(rough) < 20:
+            raise InputError(
+                "the noise cannot be estimated from so few frames; give it in the study: [noise] sd = 0.003 (in metres)"
+            )
+        sd, correlation, source = float(1.4826 * np.median(np.abs(rough))), 0.0, "roughness in time"
+        error = float(1.2 / np.sqrt(len(rough) / 2))
     if sd <= 0:
         raise InputError("the measurement has no noise at all; give a standard deviation: [noise] sd = 0.001")
-    return Noise(sd, 0.0, "roughness in time", unit, float(1.2 / np.sqrt(len(roughness) / 2)))
+    return Noise(sd, correlation, source, unit, error)
 
 
 def _fourth_difference(recording: Recording) -> FloatArray:
@@ -86,28 +87,39 @@ def _fourth_difference(recording: Recording) -> FloatArray:
     return np.asarray(d[np.isfinite(d)])
 
 
-def _difference(a: Recording, b: Recording) -> FloatArray:
-    """Difference of two repeats after the clock offset between them is taken out, constant offset too."""
+def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None:
+    """Variance [unit2], lag-one correlation and count of numbers, from the difference of two repeats.
+
+    The clock offset between them and a constant offset are taken out. Between two frames, at the share
+    f, interpolation averages noise: white noise of variance s^2 leaves (1 + f^2 + (1 - f)^2) s^2 in the
+    difference, and a lag-one covariance of f (1 - f) s^2; both are allowed for, or half-frame shifts
+    would look best and the noise too small.
+    """
     time = a.series.time - a.series.time[0]
     other = b.series.time - b.series.time[0]
-    inside = time[(time > _LARGEST_SHIFT) & (time < other[-1] - _LARGEST_SHIFT)]
-    pa = _at(inside, time, a.series.points)
-    best, smallest = np.full_like(pa, np.nan), np.inf
-    for shift in np.linspace(-_LARGEST_SHIFT, _LARGEST_SHIFT, 25):
-        d = pa - _at(inside + shift, other, b.series.points)
-        d = d - np.nanmean(d, axis=0)
-        size = float(np.nanmean(d**2))
-        if size < smallest:
-            best, smallest = d, size
-    return best
-
-
-def _at(when: FloatArray, time: FloatArray, points: FloatArray) -> FloatArray:
-    flat = points.reshape(len(points), -1)
-    return np.stack([np.interp(when, time, column) for column in flat.T], axis=1).reshape(len(when), *points.shape[1:])
-
-
-def _lag_one(d: FloatArray) -> float:
+    inside = (time >= _LARGEST_SHIFT) & (time <= other[-1] - _LARGEST_SHIFT)
+    if inside.sum() < 8:
+        return None
+    best: tuple[float, FloatArray, float] | None = None
+    for shift in np.linspace(-_LARGEST_SHIFT, _LARGEST_SHIFT, 61):
+        when = time[inside] + shift
+        d = a.series.points[inside] - interpolate(when, other, b.series.points)
+        seen = np.isfinite(d)
+        if seen.sum() < 8:
+            continue
+        d = np.where(seen, d, 0.0)
+        d = np.where(seen, d - d.sum(axis=0) / np.maximum(seen.sum(axis=0), 1), np.nan)
+        left = np.clip(np.searchsorted(other, when, side="right"), 1, len(other) - 1)
+        f = np.clip((when - other[left - 1]) / (other[left] - other[left - 1]), 0, 1)
+        mixing = float(np.mean(f * (1 - f)))
+        lost = seen.shape[0] / max(seen.shape[0] - 1, 1)  # to the constant offset
+        variance = float(np.nanmean(d**2)) * lost / (2 - 2 * mixing)
+        if best is None or variance < best[0]:
+            best = (variance, d, mixing)
+    if best is None:
+        return None
+    variance, d, mixing = best
     both = np.isfinite(d[1:]) & np.isfinite(d[:-1])
-    a, b = d[1:][both], d[:-1][both]
-    return float(np.sum(a * b) / max(np.sqrt(np.sum(a**2) * np.sum(b**2)), 1e-300))
+    covariance = float(np.mean(d[1:][both] * d[:-1][both])) if both.any() else 0.0
+    ar1 = (covariance / max(variance, 1e-300) - mixing) / 2
+    return variance, ar1, int(np.isfinite(d).sum())

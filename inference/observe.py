@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.arrays import FloatArray
+from ..core.arrays import FloatArray, IntArray
+from ..core.interpolation import interpolate
 from ..core.measurement import Recording
 from .noise import Noise
 from .residuals import Offsets
@@ -22,7 +23,7 @@ class Observer:
     def __init__(self, recordings: Sequence[Recording], noise: Noise, offsets: Offsets) -> None:
         self.recordings, self.noise, self.offsets = list(recordings), noise, offsets
 
-    def observe(self, points: Sequence[FloatArray], numbers: FloatArray, seed: int) -> list[FloatArray]:
+    def observe(self, points: Sequence[FloatArray], numbers: IntArray, seed: int) -> list[FloatArray]:
         """Flawed copies of ``points``, one array ``(N, T, P, A)`` a recording.
 
         Args:
@@ -31,7 +32,7 @@ class Observer:
             seed: of the study.
         """
         out = [np.array(p, float) for p in points]
-        for row, number in enumerate(numbers.astype(int)):
+        for row, number in enumerate(numbers):
             rng = np.random.default_rng([seed, 7919, int(number)])
             for r, recording in enumerate(self.recordings):
                 out[r][row] = self._flawed(out[r][row], recording, rng)
@@ -46,9 +47,7 @@ class Observer:
         clock = rng.normal() * self.offsets.clock
         constant = rng.normal(size=axes) * self.offsets.constant
         if clock:
-            when = np.clip(time + clock, time[0], time[-1])
-            flat = clean.reshape(len(time), -1)
-            clean = np.stack([np.interp(when, time, c) for c in flat.T], axis=1).reshape(clean.shape)
+            clean = interpolate(time + clock, time, clean)
         wild = rng.normal(size=clean.shape) * self.noise.sd
         if self.noise.ar1 > 0:
             for t in range(1, len(wild)):

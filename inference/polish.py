@@ -69,38 +69,55 @@ class Objective:
         self.noise, self.offsets, self.fixed = noise, offsets, dict(fixed or {})
         self._last: tuple[FloatArray, FloatArray] | None = None
 
-    def many(self, units: FloatArray) -> list[FloatArray]:
-        """White residuals ``(N,)`` at every row of ``units (K, D)``, simulated side by side."""
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        """White residuals ``(N,)`` at every row of ``units (K, D)``; None where a rollout failed."""
         tasks = [
             Task({**self.fixed, **self.space.as_dict(self.space.from_unit(u))}, r)
             for u in units
             for r in self.recordings
         ]
         outcomes = iter(self.pool.map(tasks))
-        rows = []
+        rows: list[FloatArray | None] = []
         for _ in units:
-            parts = []
-            for name in self.recordings:
-                recording, outcome = self.pool.problem.recordings[name], next(outcomes)
-                parts.append(
-                    residual(recording, outcome.series, self.noise, self.offsets).white
-                    if isinstance(outcome, Trajectory)
-                    else failed(recording, self.offsets)
-                )
-            rows.append(np.concatenate(parts))
+            pairs = [(self.pool.problem.recordings[name], next(outcomes)) for name in self.recordings]
+            whole = [(r, o) for r, o in pairs if isinstance(o, Trajectory)]
+            rows.append(
+                np.concatenate([residual(r, o.series, self.noise, self.offsets).white for r, o in whole])
+                if len(whole) == len(pairs)
+                else None
+            )
         return rows
 
     def one(self, unit: FloatArray) -> FloatArray:
+        """White residuals ``(N,)`` at ``unit (D,)``; a failed rollout counts as far off everywhere."""
         if self._last is None or not np.array_equal(self._last[0], unit):
-            self._last = (unit.copy(), self.many(unit[None])[0])
+            row = self.many(unit[None])[0]
+            if row is None:
+                recordings = [self.pool.problem.recordings[name] for name in self.recordings]
+                row = np.concatenate([failed(r, self.offsets) for r in recordings])
+            self._last = (unit.copy(), row)
         return self._last[1]
 
     def jacobian(self, unit: FloatArray) -> FloatArray:
-        """Derivative of the white residuals ``(N, D)`` by one-sided differences that stay in the cube."""
-        steps = np.where(unit + STEP <= 1.0, STEP, -STEP)
+        """Derivative of the white residuals ``(N, D)`` by one-sided differences that stay in the cube.
+
+        Where the neighbour cannot be simulated the other side is taken; where neither can, the
+        derivative is unknown and zero, which leaves the prior's uncertainty to that parameter.
+        """
         base = self.one(unit)
-        rows = self.many(unit + np.diag(steps))
-        return np.stack([(row - base) / step for row, step in zip(rows, steps, strict=True)], axis=1)
+        steps = np.where(unit + STEP <= 1.0, STEP, -STEP)
+        columns = np.zeros((len(base), len(unit)))
+        missing = np.arange(len(unit))
+        for sides in (steps, -steps):
+            missing = missing[((unit + sides) >= 0.0)[missing] & ((unit + sides) <= 1.0)[missing]]
+            if not len(missing):
+                break
+            rows = self.many(unit + np.diag(sides)[missing])
+            for k, row in zip(missing, rows, strict=True):
+                if row is not None:
+                    columns[:, k] = (row - base) / sides[k]
+            missing = np.array([k for k, row in zip(missing, rows, strict=True) if row is None], dtype=np.int64)
+        return columns
 
 
 def polish(objective: Objective, start: FloatArray, evaluations: int = 12) -> Polished:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.arrays import FloatArray
+from ..core.interpolation import interpolate
 from ..core.measurement import Recording
 from ..core.series import PointSeries
 from .noise import Noise
@@ -39,7 +40,24 @@ class Residual:
     @property
     def rms(self) -> float:
         """Root mean square over all seen coordinates [unit]."""
-        return float(np.sqrt(np.nanmean(self.difference**2)))
+        return float(_rms(self.difference, (0, 1, 2)))
+
+    @property
+    def by_time(self) -> FloatArray:
+        """The same of every frame ``(T,)``; NaN where nothing was seen."""
+        return _rms(self.difference, (1, 2))
+
+    @property
+    def by_point(self) -> FloatArray:
+        """The same of every point ``(P,)``; NaN where it was never seen."""
+        return _rms(self.difference, (0, 2))
+
+
+def _rms(difference: FloatArray, axes: tuple[int, ...]) -> FloatArray:
+    seen = np.isfinite(difference)
+    total = np.sum(np.where(seen, difference, 0.0) ** 2, axis=axes)
+    count = seen.sum(axis=axes)
+    return np.asarray(np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan)))
 
 
 def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets: Offsets) -> Residual:
@@ -57,11 +75,11 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
     clock, constant = 0.0, np.zeros(measured.shape[2])
     time = recording.series.time
     for _ in range(4):
-        shifted = _shift(model, time, clock)
+        shifted = interpolate(time + clock, time, model)
         slope = np.gradient(shifted, time, axis=0)
         clock_step, constant = _solve(measured - shifted, slope, clock, noise, offsets)
         clock = float(np.clip(clock + clock_step, -4 * offsets.clock, 4 * offsets.clock))
-    difference = measured - _shift(model, time, clock) - constant
+    difference = measured - interpolate(time + clock, time, model) - constant
     parts = [_weighted(difference, noise)]
     if offsets.clock > 0:
         parts.append(np.array([clock / offsets.clock]))
@@ -98,16 +116,6 @@ def _solve(
         right[1 + a] = weight * np.sum(d[..., a])
     solved = np.linalg.solve(normal, right)
     return float(solved[0]), solved[1:]
-
-
-def _shift(points: FloatArray, time: FloatArray, by: float) -> FloatArray:
-    """Points at ``time + by``, linear in between, held at the ends."""
-    if by == 0.0:
-        return points
-    when = np.clip(time + by, time[0], time[-1])
-    right = np.clip(np.searchsorted(time, when, side="right"), 1, len(time) - 1)
-    share = ((when - time[right - 1]) / (time[right] - time[right - 1]))[:, None, None]
-    return np.asarray(points[right - 1] + share * (points[right] - points[right - 1]))
 
 
 def _nearest(measured: FloatArray, model: FloatArray) -> FloatArray:

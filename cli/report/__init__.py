@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ...core.errors import MuslinError
+from ...core.store import write_text
 from ...core.study.study import Study
 
 __all__ = ["overview_figure", "write_report"]
@@ -23,11 +24,11 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
         StepMissingError: the study has not been fitted.
     """
     try:
-        from .page import render, write_page
+        from .page import render
     except ImportError as error:
         raise _missing(error) from error
     path = output or study.path.with_name(f"{study.path.stem}.report.html")
-    write_page(render(study, after), path)
+    write_text(path, render(study, after))
     return path
 
 

@@ -1,17 +1,14 @@
 """The page: figures and tables put into the template, and the file written whole or not at all."""
 
 import contextlib
-import os
 import platform
 import shlex
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from ...core.store import storage_errors
 from ...core.study.study import Study
 from ...core.version import __version__
 from . import words
@@ -185,16 +182,3 @@ def commands(found: Findings) -> list[str]:
 
 def _quoted(name: str) -> str:
     return shlex.quote(name)
-
-
-def write_page(text: str, path: Path) -> None:
-    """Write the file beside its place and rename it there."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    with storage_errors(path):
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(path)
-        finally:
-            with contextlib.suppress(OSError):
-                partial.unlink(missing_ok=True)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from ..errors import InputError, MissingFileError
 from ..registry import nearest
-from ..store import storage_errors
+from ..store import write_text
 
 
 class _Table(BaseModel):
@@ -154,10 +154,4 @@ def read_config(path: Path) -> StudyConfig:
 def write_config(config: StudyConfig, path: Path) -> None:
     """Write a study file, without the keys that were left at their default."""
     table = config.model_dump(exclude_defaults=True, exclude_none=True)
-    partial = path.with_name(f".{path.name}.partial")
-    with storage_errors(path):
-        try:
-            partial.write_text(tomli_w.dumps(table), encoding="utf-8")
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    write_text(path, tomli_w.dumps(table))

@@ -1,6 +1,5 @@
 """Many rollouts over worker processes; results in order, failures as values."""
 
-import contextlib
 import os
 import signal
 import threading
@@ -14,7 +13,7 @@ from types import TracebackType
 
 from threadpoolctl import threadpool_limits
 
-from ..errors import RolloutFailed
+from ..errors import MuslinError, RolloutFailed
 from ..rollout import Trajectory
 from .problem import Problem
 
@@ -42,6 +41,8 @@ _PROBLEM: Problem | None = None
 def _start_worker(problem: Problem) -> None:
     global _PROBLEM
     _PROBLEM = problem
+    # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # One thread of linear algebra a process: more only get in each other's way, and the order in which
     # they add up would make results depend on the number of workers.
     threadpool_limits(1)
@@ -53,8 +54,6 @@ def _die_with_parent(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(1)
-    # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _run(problem: Problem, task: Task) -> Outcome:
@@ -67,6 +66,21 @@ def _run(problem: Problem, task: Task) -> Outcome:
 def _run_in_worker(task: Task) -> Outcome:
     assert _PROBLEM is not None
     return _run(_PROBLEM, task)
+
+
+def _ready() -> bool:
+    return _PROBLEM is not None
+
+
+_NO_WORKERS = (
+    "worker processes cannot start. In a script of your own, put what runs under: if __name__ == '__main__'. "
+    "A plugin that was made in a notebook cannot travel to another process: put it into a module, or use workers=1"
+)
+
+
+def _executor(workers: int, problem: Problem) -> ProcessPoolExecutor:
+    # spawn: a fork of a process with engine or torch threads may hang
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(problem,))
 
 
 class SimulationPool:
@@ -95,10 +109,7 @@ class SimulationPool:
 
     def _open(self) -> ProcessPoolExecutor:
         if self._executor is None:
-            # spawn: a fork of a process with engine or torch threads may hang
-            self._executor = ProcessPoolExecutor(
-                self.workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(self.problem,)
-            )
+            self._executor = _executor(self.workers, self.problem)
         return self._executor
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
@@ -110,7 +121,7 @@ class SimulationPool:
                 for task in tasks:
                     yield _run(self.problem, task)
             return
-        futures: list[Future[Outcome]] = [self._open().submit(_run_in_worker, t) for t in tasks]
+        futures: list[Future[Outcome]] = [self._submit(t) for t in tasks]
         for k, future in enumerate(futures):
             try:
                 yield future.result()
@@ -118,30 +129,37 @@ class SimulationPool:
                 yield self._alone(tasks[k])
                 # whatever was queued behind the broken pool goes to a new one
                 for j in range(k + 1, len(tasks)):
-                    if futures[j].done() and futures[j].exception() is None:
-                        continue
-                    futures[j] = self._open().submit(_run_in_worker, tasks[j])
+                    if not (futures[j].done() and futures[j].exception() is None):
+                        futures[j] = self._submit(tasks[j])
 
-    def _alone(self, task: Task) -> Outcome:
-        """Run a task that was in a pool that broke in a process of its own, to learn whether it was the cause."""
+    def _submit(self, task: Task) -> Future[Outcome]:
+        try:
+            return self._open().submit(_run_in_worker, task)
+        except BrokenProcessPool:  # a worker died while the pool was idle
+            self._drop()
+            return self._open().submit(_run_in_worker, task)
+
+    def _drop(self) -> None:
         if self._executor is not None:
             self._executor.shutdown(wait=False, cancel_futures=True)
             self._executor = None
-        with contextlib.closing(_OneShot(self.problem)) as one:
-            return one.run(task)
 
+    def _alone(self, task: Task) -> Outcome:
+        """Run a task that was in a pool that broke in a process of its own, to learn whether it was the cause.
 
-class _OneShot:
-    def __init__(self, problem: Problem) -> None:
-        self._executor = ProcessPoolExecutor(
-            1, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(problem,)
-        )
-
-    def run(self, task: Task) -> Outcome:
+        Raises:
+            MuslinError: no worker process can start at all.
+        """
+        self._drop()
+        executor = _executor(1, self.problem)
         try:
-            return self._executor.submit(_run_in_worker, task).result()
-        except BrokenProcessPool:
-            return Failure("the simulator took its process down")
-
-    def close(self) -> None:
-        self._executor.shutdown(wait=False, cancel_futures=True)
+            try:
+                executor.submit(_ready).result()
+            except BrokenProcessPool as error:
+                raise MuslinError(_NO_WORKERS) from error
+            try:
+                return executor.submit(_run_in_worker, task).result()
+            except BrokenProcessPool:
+                return Failure("the simulator took its process down")
+        finally:
+            executor.shutdown(wait=False, cancel_futures=True)

@@ -148,6 +148,11 @@ def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Reco
     if points.shape[2] != 3:
         raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
     if choice == "bound":
+        if scenario.settle > 0:
+            raise InputError(
+                "[scenario] markers = 'bound' ties each marker to the object in its rest shape, so it cannot go with "
+                f"settle = {scenario.settle:g}; set settle = 0, or name the vertices under the markers"
+            )
         seen = recording.series.valid[0]
         if not seen.all():
             raise InputError(

@@ -9,7 +9,7 @@ from typing import Any
 import zarr
 
 from ..errors import InputError, StepMissingError
-from ..measurement import Measurement
+from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
 from ..store import new_store, open_store
@@ -73,20 +73,21 @@ class Study:
     def pool(self, problem: Problem | None = None) -> SimulationPool:
         return SimulationPool(problem or self.problem, self.workers)
 
-    def fingerprint(self) -> dict[str, Any]:
-        """What a fit depends on: study file, measured numbers, engine. Another fingerprint is another fit."""
-        table = self.config.model_dump(mode="json", exclude={"diagnose"})
-        for key in ("results", "hold_out", "measurement"):
+    def fingerprint(self, step: str = "fit") -> dict[str, Any]:
+        """What the result of a step depends on: study file and measured numbers. Another one, another result.
+
+        A fit depends on held-out recordings only where they are repeats, which tell the noise; compare
+        and diagnose on all of them.
+        """
+        table = self.config.model_dump(mode="json")
+        for key in ("results", "measurement", *(["hold_out"] if step == "fit" else [])):
             table["study"].pop(key, None)
-        digest = hashlib.sha256()
-        for name in self.problem.fit_on:
-            recording = self.problem.recordings[name]
-            digest.update(f"{name} {recording.motion} {recording.load!r}".encode())
-            digest.update(recording.series.time.tobytes() + recording.series.points.tobytes())
-            if recording.gripper is not None:
-                digest.update(recording.gripper.times.tobytes() + recording.gripper.poses.tobytes())
-        table["measured"] = digest.hexdigest()
-        table["engine"] = self.problem.simulator.engine_version()
+        if step != "diagnose":
+            table.pop("diagnose")
+        problem = self.problem
+        names = {r.name for pair in repeats(problem.recordings.values()) for r in pair} | set(problem.fit_on)
+        used = [r for n, r in problem.recordings.items() if n in names or step != "fit"]
+        table["measured"] = {r.name: _digest(r) for r in used}
         return table
 
     def set_aside(self) -> Path | None:
@@ -112,11 +113,15 @@ class Study:
         """Results of a finished step.
 
         Raises:
-            StepMissingError: it has not been run to its end.
+            StepMissingError: it has not been run to its end, or not since the study or the measurement changed.
         """
         group = self.results().get(step)
         if not isinstance(group, zarr.Group) or not group.attrs.get("finished"):
             raise StepMissingError(f"{self.path} has no result of {step!r} yet; run: muslin {step} {self.path}")
+        if group.attrs.get("fingerprint") != self.fingerprint(step):
+            raise StepMissingError(
+                f"{self.path} or its measurement has changed since {step!r} was run; run: muslin {step} {self.path}"
+            )
         return group
 
     def fit(self) -> Any:
@@ -154,3 +159,12 @@ class Study:
         study = Study(config, path, workers=self.workers, progress=self.progress)
         study.save()
         return study
+
+
+def _digest(recording: Recording) -> str:
+    """A hash of everything that was measured in one recording."""
+    digest = hashlib.sha256(f"{recording.motion} {recording.load!r} {recording.series.correspondence}".encode())
+    digest.update(recording.series.time.tobytes() + recording.series.points.tobytes())
+    if recording.gripper is not None:
+        digest.update(recording.gripper.times.tobytes() + recording.gripper.poses.tobytes())
+    return digest.hexdigest()

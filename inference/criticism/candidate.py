@@ -24,7 +24,6 @@ class Candidate:
         space: parameters and coefficients.
         base: number of parameters that are not coefficients of this effect.
         fit: jointly polished, in units of the noise.
-        rss: residual sum of squares.
         held_out: root mean square error on each held-out recording [unit].
     """
 
@@ -41,14 +40,26 @@ class Candidate:
     @property
     def coefficients(self) -> dict[str, tuple[float, float, str]]:
         """Mean, standard deviation and unit of every coefficient."""
+        return self.coefficients_of(self.name)
+
+    def coefficients_of(self, effect: str) -> dict[str, tuple[float, float, str]]:
+        """The same for any effect in the model."""
         low = np.array([p.low for p in self.space])
         span = np.array([p.high for p in self.space]) - low
         sd = np.sqrt(np.diag(self.fit.covariance)) * np.sqrt(max(1.0, self.rss / self.fit.count))
         return {
             p.name.split(".", 1)[1]: (float(low[k] + span[k] * self.fit.unit[k]), float(span[k] * sd[k]), p.unit)
             for k, p in enumerate(self.space)
-            if k >= self.base
+            if p.name.startswith(f"{effect}.")
         }
+
+    @property
+    def wald(self) -> float:
+        """Squared distance of the coefficients from zero, in units of their joint uncertainty."""
+        zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(self.space)[self.base :]])
+        away = self.fit.unit[self.base :] - zero
+        covariance = self.fit.covariance[self.base :, self.base :] * max(1.0, self.rss / self.fit.count)
+        return float(away @ np.linalg.solve(covariance, away))
 
     @property
     def visible(self) -> bool:
@@ -100,8 +111,8 @@ def responds(objective: Objective, start: FloatArray, base: int) -> bool:
     """
     strong = start.copy()
     strong[base:] = np.where(start[base:] < 0.7, start[base:] + 0.25, start[base:] - 0.25)
-    rows = objective.many(np.stack([start, strong]))
-    return not np.array_equal(rows[0], rows[1])
+    plain, moved = objective.many(np.stack([start, strong]))
+    return plain is None or moved is None or not np.array_equal(plain, moved)
 
 
 def unchanged(plain: Polished, start: FloatArray, response: FloatArray) -> Polished:
@@ -115,12 +126,12 @@ def unchanged(plain: Polished, start: FloatArray, response: FloatArray) -> Polis
 
 def best_starts(objective: Objective, points: FloatArray) -> list[FloatArray]:
     """``points`` from the smallest residual to the largest."""
-    sizes = [float(w @ w) for w in objective.many(points)]
+    sizes = [np.inf if w is None else float(w @ w) for w in objective.many(points)]
     return [points[k] for k in np.argsort(sizes)]
 
 
 def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
-    """Significance of the drop in residual, as standard deviations of a normal, Holm-corrected for ``tried``.
+    """Significance of the drop in residual, as standard deviations of a normal, Bonferroni-corrected for ``tried``.
 
     The likelihood ratio is scaled by what the candidate itself leaves unexplained, so that a model that
     is wrong anyway does not make every effect significant.
@@ -135,6 +146,6 @@ def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
     return float(np.sqrt(drop))  # the normal tail, far out: log p -> -z^2 / 2
 
 
-def summary(values: Sequence[float]) -> float:
-    """Root mean square of root mean squares."""
+def root_mean_square(values: Sequence[float]) -> float:
+    """Of root mean squares; NaN of none."""
     return float(np.sqrt(np.mean(np.square(values)))) if len(values) else float("nan")

@@ -1,5 +1,6 @@
 """The step ``compare``: hold the fitted model against every recording; where and when does it fail?"""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +14,8 @@ from ...core.rollout import Trajectory
 from ...core.scenario import Scenario
 from ...core.series import PointSeries
 from ...core.store import put, storage_errors
-from ...core.study import Study, Task
-from ..fitting import FitResult, load_fit, offsets_of
+from ...core.study import Outcome, Study, Task
+from ..fitting import load_fit, offsets_of
 from ..noise import Noise
 from ..residuals import Residual, residual
 
@@ -26,7 +27,19 @@ SIGNIFICANCE = 0.01
 
 @dataclass(frozen=True)
 class Row:
-    """One recording. All errors are root mean squares over coordinates [unit]."""
+    """One recording. Errors are root mean squares over coordinates [unit].
+
+    Args:
+        recording, role: its name, and ``"fit"`` or ``"held-out"``.
+        rmse: of the best fit.
+        noise: of the measurement.
+        scatter: of predictions over posterior draws.
+        baseline: of the first measured shape, carried along by the gripper.
+        default: of the unfitted model, the middle of the prior.
+        worst_time: when the best fit is farthest off [s].
+        worst_point: which point is farthest off over all times.
+        unit: of the errors.
+    """
 
     recording: str
     role: str
@@ -85,49 +98,63 @@ def compare(study: Study) -> Comparison:
         for k, outcome in enumerate(pool.map(tasks)):
             outcomes.append(outcome)
             study.progress("comparing", k + 1, len(tasks))
-    offsets = offsets_of(study)
-    rows, white = [], []
+    takes = [
+        _hold_against(study, name, outcomes[k * len(values) : (k + 1) * len(values)], fit.noise)
+        for k, name in enumerate(names)
+    ]
+    white = np.concatenate([t.residual.white for t in takes if t.row.role == "fit"])
+    p = misfit_p_value(white, len(problem.space), fit.noise, rng)
+    result = Comparison(tuple(t.row for t in takes), p, p > SIGNIFICANCE)
     with storage_errors(study.results_path):
-        root = study.results("r+")
-        group = root.create_group("compare", overwrite=True)
-        for k, name in enumerate(names):
-            of_one = outcomes[k * len(values) : (k + 1) * len(values)]
-            best = of_one[0]
-            if not isinstance(best, Trajectory):
-                raise MuslinError(f"the best fit cannot be simulated on recording {name!r}: {best.reason}")
-            recording, scenario = problem.recordings[name], problem.scenarios[name]
-            r = residual(recording, best.series, fit.noise, offsets)
-            if name in problem.fit_on:
-                white.append(r.white)
-            predicted = [o.series.points for o in of_one[2:] if isinstance(o, Trajectory)]
-            scatter = np.std(predicted, axis=0) if len(predicted) > 1 else np.zeros_like(best.series.points)
-            unfitted = of_one[1]
-            still = residual(recording, carried(recording, scenario), fit.noise, offsets)
-            row = _row(
-                recording,
-                "fit" if name in problem.fit_on else "held-out",
-                r,
-                fit.noise,
-                float(np.sqrt(np.mean(scatter**2))),
-                still.rms,
-                residual(recording, unfitted.series, fit.noise, offsets).rms
-                if isinstance(unfitted, Trajectory)
-                else float("nan"),
-            )
-            rows.append(row)
-            _write(group.create_group(name), recording, scenario, best, r, scatter)
-        p = misfit_p_value(np.concatenate(white), len(problem.space), fit.noise, rng)
-        result = Comparison(tuple(rows), p, p > SIGNIFICANCE)
+        group = study.results("r+").create_group("compare", overwrite=True)
+        for name, take in zip(names, takes, strict=True):
+            _write(group.create_group(name), problem.recordings[name], problem.scenarios[name], take)
         group.attrs.update(
             {
                 "p_value": p,
                 "adequate": result.adequate,
                 "text": result.text(),
-                "rows": [vars(row) for row in rows],
-                "finished": True,
+                "rows": [vars(row) for row in result.rows],
+                "fingerprint": study.fingerprint("compare"),
             }
         )
+        group.attrs["finished"] = True
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Take:
+    """One recording held against its predictions."""
+
+    row: Row
+    best: Trajectory
+    residual: Residual
+    scatter: FloatArray
+
+
+def _hold_against(study: Study, name: str, outcomes: Sequence[Outcome], noise: Noise) -> _Take:
+    """``outcomes``: of the best fit, of the unfitted model, and of the posterior draws."""
+    recording, scenario, offsets = study.problem.recordings[name], study.problem.scenarios[name], offsets_of(study)
+    best, unfitted, *draws = outcomes
+    if not isinstance(best, Trajectory):
+        raise MuslinError(f"the best fit cannot be simulated on recording {name!r}: {best.reason}")
+    r = residual(recording, best.series, noise, offsets)
+    predicted = [o.series.points for o in draws if isinstance(o, Trajectory)]
+    scatter = np.std(predicted, axis=0) if len(predicted) > 1 else np.zeros_like(best.series.points)
+    plain = residual(recording, unfitted.series, noise, offsets).rms if isinstance(unfitted, Trajectory) else np.nan
+    row = Row(
+        recording=name,
+        role="fit" if name in study.problem.fit_on else "held-out",
+        rmse=r.rms,
+        noise=noise.sd,
+        scatter=float(np.sqrt(np.mean(scatter**2))),
+        baseline=residual(recording, carried(recording, scenario), noise, offsets).rms,
+        default=float(plain),
+        worst_time=float(recording.series.time[int(np.nanargmax(r.by_time))]),
+        worst_point=int(np.nanargmax(r.by_point)),
+        unit=recording.series.unit,
+    )
+    return _Take(row, best, r, scatter)
 
 
 def misfit_p_value(white: FloatArray, parameters: int, noise: Noise, rng: np.random.Generator) -> float:
@@ -154,42 +181,18 @@ def carried(recording: Recording, scenario: Scenario) -> PointSeries:
     return PointSeries(recording.series.time, moved, recording.series.unit, recording.series.correspondence)
 
 
-def _row(
-    recording: Recording, role: str, r: Residual, noise: Noise, scatter: float, baseline: float, default: float
-) -> Row:
-    by_time = np.sqrt(np.nanmean(r.difference**2, axis=(1, 2)))
-    by_point = np.sqrt(np.nanmean(r.difference**2, axis=(0, 2)))
-    return Row(
-        recording=recording.name,
-        role=role,
-        rmse=r.rms,
-        noise=noise.sd,
-        scatter=scatter,
-        baseline=baseline,
-        default=default,
-        worst_time=float(recording.series.time[int(np.nanargmax(by_time))]),
-        worst_point=int(np.nanargmax(by_point)),
-        unit=recording.series.unit,
-    )
-
-
-def _write(
-    group: zarr.Group, recording: Recording, scenario: Scenario, best: Trajectory, r: Residual, scatter: FloatArray
-) -> None:
+def _write(group: zarr.Group, recording: Recording, scenario: Scenario, take: _Take) -> None:
     unit = recording.series.unit
     arrays: list[tuple[str, Any, list[str], str]] = [
         ("time", recording.series.time, ["time"], "s"),
-        ("error", np.sqrt(np.nanmean(r.difference**2, axis=(1, 2))), ["time"], unit),
-        ("scatter", np.sqrt(np.mean(scatter**2, axis=(1, 2))), ["time"], unit),
-        ("point_error", np.sqrt(np.nanmean(r.difference**2, axis=(0, 2))), ["point"], unit),
+        ("error", take.residual.by_time, ["time"], unit),
+        ("scatter", np.sqrt(np.mean(take.scatter**2, axis=(1, 2))), ["time"], unit),
+        ("point_error", take.residual.by_point, ["point"], unit),
         ("measured", recording.series.points, ["time", "point", "axis"], unit),
-        ("predicted", best.series.points, ["time", "predicted_point", "axis"], unit),
-        ("vertices", best.vertices, ["time", "vertex", "axis"], "m"),
+        ("predicted", take.best.series.points, ["time", "predicted_point", "axis"], unit),
+        ("vertices", take.best.vertices, ["time", "vertex", "axis"], "m"),
         ("triangles", scenario.body.triangles, ["triangle", "corner"], "1"),
     ]
     for name, data, dims, its_unit in arrays:
         put(group, name, data, dims, its_unit)
-    group.attrs["clock_offset_s"] = r.clock
-
-
-__all__ = ["Comparison", "FitResult", "Row", "carried", "compare", "misfit_p_value"]
+    group.attrs["clock_offset_s"] = take.residual.clock

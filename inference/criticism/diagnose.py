@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.errors import InputError
+from ...core.errors import BrokenPluginError, InputError
 from ...core.parameters import ParameterSpace
 from ...core.registry import REGISTRY
 from ...core.rollout import Trajectory
@@ -16,7 +16,7 @@ from ...core.study import Problem, SimulationPool, Study, Task
 from ..fitting import FitResult, load_fit, offsets_of
 from ..polish import Objective, Polished, polish
 from ..residuals import residual
-from .candidate import Candidate, best_starts, effect_start, responds, screening_points, summary, unchanged
+from .candidate import Candidate, best_starts, effect_start, responds, root_mean_square, screening_points, unchanged
 from .sentences import explain
 from .verdict import Decision, Evidence, decide, has_misfit
 
@@ -70,31 +70,46 @@ def diagnose(study: Study) -> Diagnosis:
             chosen = _chosen(stages[-1])
             done = (*stages[-1].effects, chosen.name)
             rest = [n for n in names if n not in done]
+            if not rest:
+                break
             stages.append(work.stage(done, rest, chosen.fit))
         named = tuple(e for s in stages if s.decision.verdict == "named" for e in s.decision.effects)
         after = _last_model(stages)
         curves = work.curves(stages[0], after)
         count = pool.count
     result = _result(study, stages, named, after, work, count, time.monotonic() - began)
-    paragraphs = explain(result, effects, stages[0].evidence, len(problem.hold_out))
+    together = stages[0].evidence.explained(after)
+    paragraphs = explain(result, effects, stages[0].evidence, together, len(problem.hold_out))
     with storage_errors(study.results_path):
         group = study.results("r+").create_group("diagnose", overwrite=True)
         for name, arrays in curves.items():
             sub = group.create_group(name)
             for key, (data, dims, unit) in arrays.items():
                 put(sub, key, data, dims, unit)
-        group.attrs.update({"result": result, "text": list(paragraphs), "finished": True})
+        group.attrs.update({"result": result, "text": list(paragraphs), "fingerprint": study.fingerprint("diagnose")})
+        group.attrs["finished"] = True
     return Diagnosis(result, tuple(paragraphs))
 
 
 def candidate_names(study: Study) -> list[str]:
-    """The effects to try: those of the study file, or all installed ones that fit the object and are not in yet."""
+    """The effects to try: those of the study file, or all installed ones that fit the object and are not in yet.
+
+    Raises:
+        InputError: none is left.
+        UnknownPluginError, BrokenPluginError: for one that the study names.
+    """
     kind = study.problem.material.kind
     told = study.config.diagnose.candidates
     names = told if told is not None else REGISTRY.names("effect")
     out = []
-    for name in names:
-        effect = REGISTRY.get("effect", name)
+    for name in dict.fromkeys(names):
+        try:
+            effect = REGISTRY.get("effect", name)
+        except BrokenPluginError as error:
+            if told is not None:
+                raise
+            study.progress(f"left out: {error}", 0, 0)
+            continue
         if name not in study.config.effects and kind in effect.object_kinds:
             out.append(name)
     if not out:
@@ -134,7 +149,7 @@ class _Work:
         evidence = Evidence(
             rss_plain=plain.rss,
             count=max(plain.count - len(objective.space), 1.0),
-            held_out_plain=summary(list(self.held_out(objective.space, plain.unit).values())),
+            held_out_plain=root_mean_square(list(self.held_out(objective.space, plain.unit).values())),
             noise_sd=self.fit.noise.sd,
             noise_error=self.fit.noise.relative_error,
             candidates=tuple(candidates),
@@ -200,12 +215,7 @@ class _Work:
             if not (isinstance(before, Trajectory) and isinstance(later, Trajectory)):
                 continue
             unit = recording.series.unit
-            errors = [
-                np.sqrt(
-                    np.nanmean(residual(recording, o.series, self.fit.noise, self.offsets).difference ** 2, axis=(1, 2))
-                )
-                for o in (before, later)
-            ]
+            errors = [residual(recording, o.series, self.fit.noise, self.offsets).by_time for o in (before, later)]
             out[name] = {
                 "time": (recording.series.time, ["time"], "s"),
                 "error_before": (errors[0], ["time"], unit),
@@ -231,6 +241,8 @@ def _last_model(stages: list[_Stage]) -> Candidate:
     named = [s for s in stages if s.decision.verdict == "named"]
     if named:
         return _chosen(named[-1])
+    if stages[0].decision.effects:  # tied: the first of them
+        return _chosen(stages[0])
     return min(stages[0].evidence.candidates, key=lambda c: c.rss)
 
 
@@ -245,15 +257,17 @@ def _result(
 ) -> dict[str, Any]:
     first = stages[0]
     e = first.evidence
-    held = np.isfinite(e.held_out_plain)
+    held = not np.isnan(e.held_out_plain)
     before = e.held_out_plain if held else work.fitted_error(first.plain)
-    later = summary(list(after.held_out.values())) if held else work.fitted_error(after.fit)
+    later = root_mean_square(list(after.held_out.values())) if held else work.fitted_error(after.fit)
     rows = []
     for c in sorted(e.candidates, key=lambda c: c.rss):
+        # of effects that were named together, what they are together
+        coefficients = after.coefficients_of(c.name) if c.name in named else c.coefficients
         rows.append(
             {
                 "name": c.name,
-                "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in c.coefficients.items()},
+                "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in coefficients.items()},
                 "explained": e.explained(c),
                 "z": e.z(c),
                 "held_out_before": e.held_out_plain if held else None,

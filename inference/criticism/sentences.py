@@ -8,18 +8,29 @@ from ...core.effect import Effect
 from .verdict import EXPLAINS, Evidence
 
 
-def explain(result: dict[str, Any], effects: dict[str, type[Effect]], evidence: Evidence, held_out: int) -> list[str]:
-    """Paragraphs for people: the verdict first, then what it rests on and what could not be seen."""
+def explain(
+    result: dict[str, Any], effects: dict[str, type[Effect]], evidence: Evidence, together: float, held_out: int
+) -> list[str]:
+    """Paragraphs for people: the verdict first, then what it rests on and what could not be seen.
+
+    Args:
+        result: the JSON of the diagnosis.
+        effects: classes by name.
+        evidence: of the first stage.
+        together: share of the excess misfit that everything named explains.
+        held_out: number of held-out recordings.
+    """
     error = result["error"]
     where = "held-out error" if held_out else "error on the fitted recordings"
     verdict, named = result["verdict"], result["effects"]
     ratio = np.sqrt(evidence.rss_plain / evidence.count)
     out: list[str] = []
     if verdict == "named":
-        first = next(c for c in result["candidates"] if c["name"] == named[0])
+        rows = [c for n in named for c in result["candidates"] if c["name"] == n]
         out.append(
-            f"Missing: {' and '.join(named)}. The object {effects[named[0]].symptom}; {named[0]} explains "
-            f"{100 * first['explained']:.0f} % of the excess misfit, {_coefficients(first)}; {where} "
+            f"Missing: {' and '.join(named)}. The object {' and '.join(effects[n].symptom for n in named)}; "
+            f"{' and '.join(named)} {'explains' if len(named) == 1 else 'together explain'} "
+            f"{100 * together:.0f} % of the excess misfit, {'; '.join(_coefficients(c) for c in rows)}; {where} "
             f"{length(error['before'], error['unit'])} → {length(error['after'], error['unit'])}, "
             f"noise {length(error['noise'], error['unit'])}."
         )
@@ -48,7 +59,8 @@ def explain(result: dict[str, Any], effects: dict[str, type[Effect]], evidence: 
             "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were "
             "missing. Record a motion that excites the object more."
         )
-    rivals = [c for c in result["candidates"] if c["name"] not in named and c["explained"] > 0.2]
+    told_already = named if verdict != "none" else [result["candidates"][0]["name"]]
+    rivals = [c for c in result["candidates"] if c["name"] not in told_already and c["explained"] > 0.2]
     if verdict in ("named", "none") and rivals:
         told = ", ".join(f"{c['name']} ({100 * c['explained']:.0f} %)" for c in rivals[:3])
         out.append(f"Tried and less able: {told}.")

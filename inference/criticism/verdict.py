@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy import stats
 
-from .candidate import Candidate, summary, z_value
+from .candidate import Candidate, root_mean_square, z_value
 
 Verdict = Literal["named", "tied", "none", "cannot-tell", "no-misfit"]
 
@@ -17,6 +18,10 @@ SIGNIFICANT = 4.0
 MARGIN = 10.0
 #: ... and by more than this share of what the best one leaves unexplained.
 SHARE_LEFT = 0.5
+#: It must take away this share of the excess variance on held-out motions ...
+HELD_OUT_SHARE = 0.2
+#: ... where there is more of it than this share of the noise variance.
+HELD_OUT_SLACK = 0.02
 #: Misfit that is not worth an explanation: excess over the noise variance, as a share of it.
 NEGLIGIBLE = 0.10
 
@@ -27,8 +32,9 @@ class Evidence:
 
     Args:
         rss_plain: residual sum of squares of the model as it is [noise variances].
-        count: of independent residuals.
-        held_out_plain: root mean square error on held-out recordings [unit]; NaN if there are none.
+        count: degrees of freedom: independent residuals less parameters.
+        held_out_plain: root mean square error on held-out recordings [unit]; NaN if there are none, infinite if
+            they cannot be simulated.
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
         candidates: refitted.
@@ -59,13 +65,20 @@ class Evidence:
         return z_value(self.rss_plain, candidate, len(self.candidates))
 
     def held_out(self, candidate: Candidate) -> float:
-        return summary(list(candidate.held_out.values()))
+        return root_mean_square(list(candidate.held_out.values()))
 
     def better_held_out(self, candidate: Candidate) -> bool:
-        """The excess error on motions it was not fitted to falls; true if there are none to ask."""
-        if not np.isfinite(self.held_out_plain):
+        """The excess error on motions it was not fitted to falls; true if there are none to ask.
+
+        Where the plain model has no excess there to speak of, it must not rise.
+        """
+        if np.isnan(self.held_out_plain):
             return True
-        return self.held_out(candidate) < self.held_out_plain
+        before, after, noise = self.held_out_plain**2, self.held_out(candidate) ** 2, self.noise_sd**2
+        excess = before - noise
+        if excess < HELD_OUT_SLACK * noise:
+            return bool(after < before + HELD_OUT_SLACK * noise)
+        return bool(after < before - HELD_OUT_SHARE * excess)
 
 
 @dataclass(frozen=True)
@@ -104,10 +117,10 @@ def decide(e: Evidence) -> Decision:
 
 
 def _moved(candidate: Candidate) -> bool:
-    """At least one coefficient is away from zero by more than its uncertainty allows."""
-    return any(abs(mean) > 2 * sd for mean, sd, _ in candidate.coefficients.values())
+    """The coefficients are away from zero by more than their joint uncertainty allows (three standard deviations)."""
+    return bool(candidate.wald > stats.chi2.isf(0.0027, len(candidate.space) - candidate.base))
 
 
 def _clear_gain(e: Evidence, candidate: Candidate) -> bool:
     """A gain so significant that it is a misfit, though the total is within what the noise may be."""
-    return e.z(candidate) > 2 * SIGNIFICANT and np.isfinite(e.held_out_plain)
+    return bool(e.z(candidate) > 2 * SIGNIFICANT and not np.isnan(e.held_out_plain))

@@ -27,8 +27,6 @@ class ActuatorLag(Effect):
         tail = 10.0 * tau  # the lagging gripper still moves after the last command
         times = np.arange(motion.times[0], motion.times[-1] + tail + time_step, time_step)
         u = motion.at(times)
-        signs = np.where(np.sum(u[1:, :, 3:] * u[:-1, :, 3:], axis=-1) < 0, -1.0, 1.0)
-        u[1:, :, 3:] *= np.cumprod(signs, axis=0)[..., None]
         decay = np.exp(-time_step / tau)
         ramp = 1.0 - tau / time_step * (1.0 - decay)
         y = np.empty_like(u)

@@ -12,7 +12,7 @@ from muslin.core.errors import InputError
 from muslin.core.material import ClothMaterial, SolidMaterial
 from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
-from muslin.core.rollout import rollout
+from muslin.core.rollout import COMMAND_STEP, rollout
 from muslin.core.simulator import Simulator
 from muslin.plugins.effects.air import AirDrag
 from muslin.plugins.effects.surface import AIR_DENSITY
@@ -163,8 +163,8 @@ def test_held_vertices_follow_the_command_exactly(engine, kind, lag):
     task, material = carried(kind)
     effect = REGISTRY.get("effect", "actuator-lag")(time_constant=lag)
     done = rollout(simulator(engine), task, material, [effect])
-    made = effect.on_command(task.motion, 0.005) if lag else task.motion
-    expected = task.held_positions(made, task.times, task.world_vertices())
+    made = effect.on_command(task.motion, COMMAND_STEP) if lag else task.motion
+    expected = replace(task, motion=made).held_positions(task.times, task.world_vertices())
     np.testing.assert_allclose(done.vertices[:, task.held], expected, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(done.poses, made.at(task.times))
     assert np.ptp(expected, axis=0).max() > 0.05

@@ -167,13 +167,20 @@ def put_diagnose(root: zarr.Group, verdict: str = "named") -> None:
     group.attrs.update(finished=True, text=text, result=result)
 
 
-def make_study(folder: Path, *steps: str, verdict: str = "named", hidden: bool = True, drag: bool = False) -> Study:
+def make_study(
+    folder: Path,
+    *steps: str,
+    verdict: str = "named",
+    hidden: bool = True,
+    drag: bool = False,
+    correspondence: bool = True,
+) -> Study:
     """A study in ``folder`` whose store holds these steps."""
     path = folder / ("cloth-with-air-drag.toml" if drag else "cloth.toml")
     store = folder / "recording.zarr"
     if not store.exists():
         label = {"effect": "air-drag", "values": {"drag_coefficient": 1.2, "<i>": [1, 2]}} if hidden else None
-        recordings = [Recording(n, PointSeries(takes(n)[0], takes(n)[1])) for n in ROLES]
+        recordings = [Recording(n, PointSeries(*takes(n)[:2], correspondence=correspondence)) for n in ROLES]
         save_measurement(Measurement(tuple(recordings)), store, hidden=label)
     table = {
         "study": {"measurement": "recording.zarr", "hold_out": [n for n, r in ROLES.items() if r != "fit"], "seed": 7},
@@ -190,4 +197,6 @@ def make_study(folder: Path, *steps: str, verdict: str = "named", hidden: bool =
             put_compare(root, drag)
         if "diagnose" in steps:
             put_diagnose(root, verdict)
+        for step in steps:
+            root[step].attrs["fingerprint"] = study.fingerprint(step)
     return study

@@ -6,14 +6,11 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from made_up_study import ROLES, make_study, takes
+from made_up_study import ROLES, make_study
 
 from muslin.cli.report import overview_figure, write_report
 from muslin.cli.report.words import spread
 from muslin.core.errors import MuslinError, StepMissingError, StoreError
-from muslin.core.measurement import Measurement, Recording
-from muslin.core.measurement_store import save_measurement
-from muslin.core.series import PointSeries
 from muslin.core.study.study import Study
 
 
@@ -155,10 +152,7 @@ def test_survives_lost_measurement_pixels_and_no_meshes(tmp_path: Path) -> None:
 
 
 def test_points_without_correspondence_are_not_paired(tmp_path: Path) -> None:
-    study = make_study(tmp_path, "fit", "compare")
-    series = [Recording(n, PointSeries(takes(n)[0], takes(n)[1], correspondence=False)) for n in ROLES]
-    save_measurement(Measurement(tuple(series)), study.measurement_path, overwrite=True)
-    page = page_of(study)
+    page = page_of(make_study(tmp_path, "fit", "compare", correspondence=False))
     assert "points" not in page.sections and page.figures["img"] == 3
 
 

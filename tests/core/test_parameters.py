@@ -52,12 +52,9 @@ def test_outside_the_box_is_outside_the_cube() -> None:
     assert space.to_unit(np.array([0.0, 0.5]))[0] < 0
 
 
-def test_dictionary_and_vector() -> None:
+def test_dictionary() -> None:
     space = ParameterSpace((Parameter("a", "m", 0, 1), Parameter("b", "s", 0, 1)))
     assert space.as_dict(np.array([0.25, 0.5])) == {"a": 0.25, "b": 0.5}
-    assert space.as_vector({"b": 0.5, "a": 0.25}).tolist() == [0.25, 0.5]
-    with pytest.raises(InputError, match="no value for parameter b"):
-        space.as_vector({"a": 1.0})
 
 
 @pytest.mark.parametrize(

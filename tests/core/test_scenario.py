@@ -47,7 +47,7 @@ def test_held_vertices_follow_a_turning_gripper() -> None:
     poses = np.array([[[0, 0, 0, 1.0, 0, 0, 0]], [[0.1, 0, 0, *quarter]]])
     motion = Motion(np.array([0.0, 1.0]), poses)
     vertices = scenario.world_vertices()
-    held = scenario.held_positions(motion, np.array([0.0, 1.0]), vertices)
+    held = replace(scenario, motion=motion).held_positions(np.array([0.0, 1.0]), vertices)
     start = vertices[scenario.held]
     np.testing.assert_allclose(held[0], start, atol=1e-12)
     turned = np.stack([-start[:, 1] + 0.1, start[:, 0], start[:, 2]], axis=1)
@@ -77,7 +77,7 @@ def test_presets_stand_on_their_own(name: str) -> None:
         name, body, p.grasps(body), motion, np.array([0.0, 1.0]), np.eye(len(body.vertices)), p.load_vertices(body)
     )
     assert body.kind == p.kind
-    held = scenario.held_positions(motion, np.array([0.0]), scenario.world_vertices())
+    held = replace(scenario, motion=motion).held_positions(np.array([0.0]), scenario.world_vertices())
     np.testing.assert_allclose(held[0], scenario.world_vertices()[scenario.held], atol=1e-12)
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from muslin.core.body import cloth_grid
 from muslin.core.material import ClothMaterial
 from muslin.core.motion import Motion
-from muslin.core.rollout import rollout
+from muslin.core.rollout import COMMAND_STEP, rollout
 from muslin.core.scenario import Scenario
 from muslin.plugins.effects.command import ActuatorLag
 
@@ -146,7 +146,7 @@ def test_the_object_follows_the_lagging_gripper():
         load_vertices=np.zeros(0, np.int64),
     )
     done = rollout(engine(), task, ClothMaterial(stretch_stiffness=60.0), [ActuatorLag(time_constant=0.03)])
-    expected = lagged(task.motion, 0.03, times)
+    expected = ActuatorLag(time_constant=0.03).on_command(task.motion, COMMAND_STEP).at(times)
     np.testing.assert_allclose(done.poses, expected, atol=1e-12)
     moved = done.vertices[:, [0, 2]] - done.vertices[0, [0, 2]]
     np.testing.assert_allclose(moved, np.repeat(expected[:, :, :3], 2, axis=1), atol=1e-12)
