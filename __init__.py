@@ -1,4 +1,4 @@
-"""muslin: make simulators of cloth, rope and soft solids match reality.
+"""muslin: make simulators of cloth and soft solids match reality.
 
 Fit a simulator to a recording, see where it fails, learn which physical effect is missing, add it.
 """

@@ -74,5 +74,8 @@ def run(arguments: Sequence[str] | None = None) -> NoReturn:
             traceback.print_exc()
         print(f"muslin: error: {message}", file=sys.stderr)
     if status == INTERRUPTED:
-        print("muslin: interrupted; what was simulated is kept, run the same command to go on", file=sys.stderr)
+        print(
+            "muslin: interrupted; a fit keeps what it has simulated and goes on when the same command is run again",
+            file=sys.stderr,
+        )
     sys.exit(status if isinstance(status, int) else 0)

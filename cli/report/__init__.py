@@ -28,7 +28,9 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
     except ImportError as error:
         raise _missing(error) from error
     path = output or study.path.with_name(f"{study.path.stem}.report.html")
-    write_text(path, render(study, after))
+    page = render(study, after)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, page)
     return path
 
 

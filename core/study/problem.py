@@ -90,6 +90,8 @@ def build_problem(config: StudyConfig, measurement: Measurement) -> Problem:
     kind = base.kind
     material = with_fields(MATERIALS[kind](), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
+    for name in config.diagnose.candidates or []:
+        REGISTRY.get("effect", name)
     coefficients, fixed = _effect_values(config, effects)
     space = ParameterSpace(_parameters(config, kind, material) + coefficients)
     simulator = _plugin("simulator", config.simulator.name, config.simulator.options)
@@ -186,7 +188,21 @@ def _parameters(config: StudyConfig, kind: str, material: Material) -> tuple[Par
             known = [*material.__dataclass_fields__, "scale"]
             raise InputError(f"[parameters.{name}]: unknown.{nearest(name, known)} Known: {', '.join(known)}")
         out.append(_parameter(name, table, UNITS.get(name, "1"), f"parameters.{name}"))
+        for bound in (table.low, table.high):
+            _check_bound(material, name, bound)
     return tuple(out)
+
+
+def _check_bound(material: Material, name: str, bound: float) -> None:
+    """A bound that no material can have is said now, not in the middle of a fit."""
+    if name == "scale":
+        if bound <= 0:
+            raise InputError(f"[parameters.scale]: must be above zero, but a bound is {bound:g}")
+        return
+    try:
+        with_fields(material, {name: bound})
+    except InputError as error:
+        raise InputError(f"[parameters.{name}]: {error}") from error
 
 
 def _parameter(name: str, table: ParameterTable, unit: str, where: str) -> Parameter:

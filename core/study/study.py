@@ -85,6 +85,7 @@ class Study:
         if step != "diagnose":
             table.pop("diagnose")
         problem = self.problem
+        table["study"]["fit_on"] = list(problem.fit_on)
         names = {r.name for pair in repeats(problem.recordings.values()) for r in pair} | set(problem.fit_on)
         used = [r for n, r in problem.recordings.items() if n in names or step != "fit"]
         table["measured"] = {r.name: _digest(r) for r in used}

@@ -48,7 +48,9 @@ def plate_force(area_vectors: FloatArray, relative: FloatArray, drag: float, lif
         f = -1/2 rho A [ (C_D - C_L) (v_r . n) v_r + C_L |v_r|^2 n ]
 
     A sheet feels it once per triangle whichever side leads; on a closed surface only the faces that
-    move into the air feel it. Broadside (v_r parallel to n) the force is 1/2 rho A C_D |v_r|^2.
+    move into the air feel it. Where a sheet moves exactly edge-on, its leading side is undefined and
+    the lift jumps from one sign to the other, as the law has it. Broadside (v_r parallel to n) the
+    force is 1/2 rho A C_D |v_r|^2.
     """
     area = np.linalg.norm(area_vectors, axis=1, keepdims=True)
     normal = area_vectors / np.maximum(area, 1e-300)

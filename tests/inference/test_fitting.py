@@ -13,7 +13,7 @@ import xarray
 import zarr
 from small import TRUTH, small_measurement, write_study
 
-from muslin.core.errors import StepMissingError
+from muslin.core.errors import InputError, StepMissingError
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
@@ -124,3 +124,25 @@ def test_a_changed_measurement_is_fitted_anew(small_study: Study) -> None:
 def test_steps_say_what_is_missing(small_study: Study) -> None:
     with pytest.raises(StepMissingError, match="muslin fit"):
         small_study.compare()
+
+
+def test_results_of_an_earlier_state_of_the_study_are_not_used(small_study: Study) -> None:
+    small_study.fit()
+    small_study.compare()
+    changed = Study.load(small_study.path, workers=1)
+    changed.config.study.hold_out = []
+    changed.config.study.fit_on = ["near", "far"]
+    changed.step_results("fit")  # does not depend on what is held out
+    with pytest.raises(StepMissingError, match="changed since 'compare'"):
+        changed.step_results("compare")
+    changed.config.material["areal_density"] = 0.3
+    with pytest.raises(StepMissingError, match="muslin fit"):
+        Study(changed.config, changed.path, workers=1).compare()
+
+
+def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(small_study: Study) -> None:
+    config = small_study.config.model_copy(deep=True)
+    config.estimator = config.estimator.model_validate({"name": "bayessim-rkhs", "no_such_option": 1})
+    with pytest.raises(InputError, match="no_such_option"):
+        Study(config, small_study.path, workers=1).fit()
+    assert not small_study.results_path.exists()

@@ -1,0 +1,55 @@
+"""Least squares over a simulator that sometimes fails: what is not known stays as wide as the prior."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from muslin.core.arrays import FloatArray
+from muslin.core.errors import MuslinError
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.core.study import SimulationPool, Study
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, polish
+from muslin.inference.residuals import Offsets
+
+
+class Linear(Objective):
+    """White residuals that are linear in two parameters; beyond ``wall`` of the first nothing can be simulated."""
+
+    def __init__(self, wall: float) -> None:
+        space = ParameterSpace((Parameter("a", "1", 0, 1), Parameter("b", "1", 0, 1)))
+        super().__init__(None, space, [], Noise(1.0, 0.0, "test", "m", 0.01), Offsets())  # type: ignore[arg-type]
+        self.wall = wall
+        self.matrix = np.random.default_rng(0).normal(size=(40, 2)) * 20
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return [None if u[0] > self.wall else self.matrix @ (u - np.array([0.4, 0.7])) for u in units]
+
+
+def test_the_minimum_and_its_covariance() -> None:
+    best = polish(Linear(2.0), np.array([0.1, 0.1]))
+    np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
+    matrix = Linear(2.0).matrix
+    np.testing.assert_allclose(best.covariance, np.linalg.inv(matrix.T @ matrix + 12 * np.eye(2)), rtol=1e-6)
+
+
+def test_a_neighbour_that_fails_does_not_pass_for_certainty() -> None:
+    objective = Linear(wall=0.4)
+    slope = objective.jacobian(np.array([0.4, 0.5]))  # a step up fails, a step down does not
+    np.testing.assert_allclose(slope, objective.matrix, rtol=1e-6)
+    objective.wall = 0.001  # one side fails, the other is outside the cube
+    assert not objective.jacobian(np.array([0.001, 0.5]))[:, 0].any()
+
+
+@pytest.mark.slow
+def test_workers_that_cannot_start_are_one_clear_error(small_study: Study) -> None:
+    class Local:  # cannot be pickled, as a plugin made in a notebook
+        pass
+
+    problem = replace(small_study.problem, effects={"local": Local})  # type: ignore[dict-item]
+    with SimulationPool(problem, 2) as pool, pytest.raises((MuslinError, AttributeError, TypeError)):
+        list(pool.map([]))
+        from muslin.core.study import Task
+
+        list(pool.map([Task({"stretch_stiffness": 100.0, "bending_rigidity": 1e-5}, "near")]))
