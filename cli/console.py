@@ -1,6 +1,7 @@
 """Talking to a person: results on standard output, progress and errors on standard error."""
 
 import math
+import shlex
 import sys
 import time
 from types import TracebackType
@@ -19,9 +20,14 @@ def say(text: str) -> None:
     typer.echo(text)
 
 
-def next_step(*commands: str) -> None:
-    """Name the commands to run next."""
-    typer.echo("next: " + "   or: ".join(commands))
+def command(*parts: object) -> str:
+    """A command line that a shell takes as it is printed, whatever a path has in it."""
+    return shlex.join(["muslin", *(str(p) for p in parts)])
+
+
+def next_step(*commands: str, note: str = "") -> None:
+    """Name the commands to run next, and what to know before."""
+    typer.echo("next: " + "   or: ".join(commands) + (f"   ({note})" if note else ""))
 
 
 class ProgressView:

@@ -75,7 +75,7 @@ def run(arguments: Sequence[str] | None = None) -> NoReturn:
         print(f"muslin: error: {message}", file=sys.stderr)
     if status == INTERRUPTED:
         print(
-            "muslin: interrupted; a fit keeps what it has simulated and goes on when the same command is run again",
+            "muslin: interrupted; a fit that is run again goes on from what it has simulated",
             file=sys.stderr,
         )
     sys.exit(status if isinstance(status, int) else 0)

@@ -7,7 +7,7 @@ import numpy as np
 from ..core.errors import InputError
 from ..core.measurement import Measurement
 from ..core.scenarios import preset
-from ..core.study import build_problem, parse_config
+from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
 _CHOICES = ("all", "bound", "nearest")
@@ -87,3 +87,33 @@ def _on_nearest(plan: Plan, measured: Measurement, where: str, count: int) -> tu
     if len(set(ids.tolist())) < count:
         remarks.append("warning: several points share a vertex; a finer mesh (--vertices) keeps them apart")
     return replace(plan, markers=[int(i) for i in ids]), remarks
+
+
+def doubtful_starts(problem: Problem) -> list[str]:
+    """Warnings where the recordings and the scenario do not go together at the first frame."""
+    remarks = []
+    for name, recording in problem.recordings.items():
+        scenario = problem.scenarios[name]
+        moves = len(preset(scenario.name).motion().times) > 1
+        if recording.gripper is None and moves and scenario.grasps:
+            remarks.append(
+                f"warning: {name} has no gripper poses, so the built-in motion of {scenario.name!r} is taken; import "
+                "the measured one with --gripper, or use scenario 'hang' if the grippers did not move"
+            )
+        if recording.gripper is not None and recording.gripper.grippers > len(scenario.grasps) > 0:
+            remarks.append(
+                f"warning: {name} has {recording.gripper.grippers} grippers, but the object is held by "
+                f"{len(scenario.grasps)}; give every gripper its vertices in [scenario] grasps"
+            )
+        vertices = scenario.world_vertices()
+        first = recording.series.points[0]
+        first = first[np.isfinite(first).all(axis=1)]
+        if not len(first) or first.shape[1] != 3:
+            continue
+        apart = float(np.linalg.norm(np.median(first, axis=0) - np.median(vertices, axis=0)))
+        if apart > 0.5 * float(np.ptp(vertices, axis=0).max()):
+            remarks.append(
+                f"warning: {name} starts {apart:.2g} m away from where the model puts the object; check --up, the "
+                "unit, the gripper poses, the scenario and the size"
+            )
+    return list(dict.fromkeys(remarks))

@@ -12,7 +12,8 @@ from ..core.errors import InputError
 from ..core.importing import ImportOptions, import_file
 from ..core.measurement import Measurement, Recording
 from ..core.measurement_store import save_measurement
-from .console import next_step, say
+from ..core.scenarios import PRESETS
+from .console import command, next_step, say
 
 T = TypeVar("T")
 _EACH = "Once for all files, or once a file, in their order."
@@ -101,7 +102,10 @@ def import_files(
     say(f"wrote {output}")
     for recording in measurement.recordings:
         say("  " + _summary(recording))
-    next_step(f"muslin new study.toml --measurement {output} --scenario NAME --simulator mujoco")
+    next_step(
+        command("new", "study.toml", "--measurement", output, "--scenario", "fling", "--simulator", "mujoco"),
+        note=f"scenarios: {', '.join(PRESETS)}",
+    )
 
 
 def _each(values: Sequence[T] | None, k: int, files: Sequence[Path], option: str) -> T | None:

@@ -15,9 +15,9 @@ from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
 from ..core.store import write_text
 from ..core.study import build_problem, parse_config
-from .console import next_step, say
+from .console import command, next_step, say
 from .output import check_output
-from .placing import parse_markers, place_markers
+from .placing import doubtful_starts, parse_markers, place_markers
 from .study_file import Plan, study_text
 
 Number = TypeVar("Number", int, float)
@@ -92,14 +92,15 @@ def new(
     )
     plan, remarks = place_markers(plan, measured, str(study))
     text = study_text(plan)
-    build_problem(parse_config(tomllib.loads(text), str(study)), measured)
+    problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured)
+    remarks += doubtful_starts(problem)
     write_text(study, text)
     say(f"wrote {study}: fits {base.kind} {scenario!r} on {', '.join(fitted)}")
     if held:
         say(f"  held out: {', '.join(held)}")
     for remark in remarks:
         say(f"  {remark}")
-    next_step(f"look through {study}, then: muslin fit {study}")
+    next_step(command("fit", study), note="look through the study file first")
 
 
 def _names(text: str, measured: Measurement, option: str) -> list[str]:

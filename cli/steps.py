@@ -10,7 +10,7 @@ import typer
 from ..core.errors import InputError
 from ..core.store import write_text
 from ..core.study import Study
-from .console import ProgressView, next_step, say
+from .console import ProgressView, command, next_step, say
 from .output import check_output
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
@@ -39,7 +39,7 @@ def fit(study: StudyFile, workers: Workers = None) -> None:
     with ProgressView() as progress:
         result = Study.load(study, workers=workers, progress=progress).fit()
     say(result.text())
-    next_step(f"muslin compare {study}")
+    next_step(command("compare", study))
 
 
 def compare(study: StudyFile, workers: Workers = None) -> None:
@@ -47,7 +47,7 @@ def compare(study: StudyFile, workers: Workers = None) -> None:
     with ProgressView() as progress:
         result = Study.load(study, workers=workers, progress=progress).compare()
     say(result.text())
-    next_step(f"muslin diagnose {study}")
+    next_step(command("diagnose", study), command("report", study))
 
 
 def diagnose(
@@ -74,9 +74,9 @@ def diagnose(
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:
         output = study.with_name(f"{study.stem}-with-{effects[0]}.toml")
-        next_step(f"muslin add {effects[0]} {study} -o {output}", f"muslin report {study}")
+        next_step(command("add", effects[0], study, "-o", output), command("report", study))
     else:
-        next_step(f"muslin report {study}")
+        next_step(command("report", study))
 
 
 def add(
@@ -98,7 +98,10 @@ def add(
     check_output(target, force)
     made = loaded.add(effect, target, overwrite=force)
     say(f"wrote {made.path}: the model of {study} with {effect}")
-    next_step(f"muslin fit {made.path}")
+    next_step(
+        f"{command('fit', made.path)} && {command('compare', made.path)} && "
+        f"{command('report', study, '--after', made.path)}"
+    )
 
 
 def report(

@@ -46,6 +46,8 @@ class Scenario:
     def __post_init__(self) -> None:
         count = len(self.body.vertices)
         for what, ids in [*((f"gripper {g}", v) for g, v in enumerate(self.grasps)), ("the load", self.load_vertices)]:
+            if not len(ids) and what.startswith("gripper"):
+                raise InputError(f"scenario {self.name!r}: {what} holds no vertex; name some, or leave it out")
             if len(ids) and (ids.min() < 0 or ids.max() >= count):
                 bad = int(ids.max() if ids.max() >= count else ids.min())
                 raise InputError(
@@ -107,7 +109,8 @@ class Scenario:
 def marker_weights(count: int, ids: IntArray) -> FloatArray:
     """Weights ``(M, V)`` of markers that sit on vertices ``ids``."""
     if len(ids) and (ids.min() < 0 or ids.max() >= count):
-        raise InputError(f"a marker sits on vertex {int(ids.max())}, but the mesh has vertices 0 to {count - 1}")
+        wrong = ids[(ids < 0) | (ids >= count)]
+        raise InputError(f"a marker sits on vertex {int(wrong[0])}, but the mesh has vertices 0 to {count - 1}")
     weights = np.zeros((len(ids), count))
     weights[np.arange(len(ids)), ids] = 1.0
     return weights

@@ -43,6 +43,11 @@ class PointSeries:
                 f"time must rise, but time[{k}] = {t[k]:g} s follows time[{k - 1}] = {t[k - 1]:g} s; "
                 "sort the frames or drop the repeated ones"
             )
+        if float(np.median(np.diff(t))) > 5.0:
+            raise InputError(
+                f"frames are {float(np.median(np.diff(t))):g} s apart in the middle; time must be in seconds, "
+                "is it in milliseconds?"
+            )
         if self.unit not in ("m", "px"):
             raise InputError(f"unit must be 'm' or 'px', not {self.unit!r}")
         if not self.valid.any():

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import zarr
 
-from .errors import InputError, MissingFileError, StoreError
+from .errors import InputError, MissingFileError, MuslinError, StoreError
 
 FORMAT = 1
 
@@ -87,6 +87,19 @@ def open_store(path: Path, mode: str = "r") -> zarr.Group:
     return root
 
 
+@contextlib.contextmanager
+def damage_errors(path: Path) -> Iterator[None]:
+    """Turn what zarr raises on a damaged store into one clear :class:`StoreError`."""
+    try:
+        yield
+    except MuslinError:
+        raise
+    except (OSError, ValueError, KeyError, RuntimeError, TypeError, AttributeError) as error:
+        raise StoreError(
+            f"{path} is damaged ({type(error).__name__}: {error}); move it away and run the fit again"
+        ) from error
+
+
 def put(
     group: zarr.Group,
     name: str,
@@ -134,8 +147,10 @@ def subgroup(group: zarr.Group, name: str) -> zarr.Group:
 
 
 def read(group: zarr.Group, name: str) -> npt.NDArray[Any]:
-    """One whole array; :class:`InputError` if there is none of that name."""
-    array = group.get(name)
-    if not isinstance(array, zarr.Array):
-        raise InputError(f"store has no array {group.path}/{name}")
-    return np.asarray(array[...])
+    """One whole array; :class:`StoreError` if there is none of that name, or it cannot be read."""
+    path = Path(str(group.store_path).removeprefix("file:"))
+    with damage_errors(path):
+        array = group.get(name)
+        if not isinstance(array, zarr.Array):
+            raise StoreError(f"{path} has no array {name!r}; move the store away and run the fit again")
+        return np.asarray(array[...])

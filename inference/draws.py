@@ -9,7 +9,7 @@ import zarr
 from ..core.arrays import FloatArray, IntArray
 from ..core.errors import StoreError
 from ..core.rollout import Trajectory
-from ..core.store import empty_draws, put, storage_errors
+from ..core.store import damage_errors, empty_draws, put, storage_errors
 from ..core.study import Outcome, Problem, Study
 
 ABSENT, WHOLE, FAILED = 0, 1, 2
@@ -31,7 +31,9 @@ class DrawStore:
         self._path = study.results_path
         self._recordings = list(problem.fit_on)
         made_with = {"fingerprint": study.fingerprint(), "engine": problem.simulator.engine_version()}
-        found = study.results("r+").get("fit")
+        root = study.results("r+")
+        with damage_errors(self._path):
+            found = root.get("fit")
         if isinstance(found, zarr.Group) and any(found.attrs.get(k) not in (None, v) for k, v in made_with.items()):
             study.progress(f"the study has changed; its earlier results are kept in {study.set_aside()}", 0, 0)
             found = None
@@ -40,9 +42,10 @@ class DrawStore:
             with storage_errors(self._path):
                 fit = self._create(study.results("r+"), problem, count, made_with)
         self.group: zarr.Group = fit
-        self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
-        self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
-        self.status = np.asarray(self._draws["status"][...])
+        with damage_errors(self._path):
+            self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
+            self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
+            self.status = np.asarray(self._draws["status"][...])
 
     @staticmethod
     def _create(root: zarr.Group, problem: Problem, count: int, made_with: dict[str, Any]) -> zarr.Group:
@@ -89,8 +92,11 @@ class DrawStore:
         if (self.status[:upto] == ABSENT).any():
             raise StoreError(f"{self._path}: a draw of an earlier round is missing")
         whole = np.flatnonzero(self.status[:upto] == WHOLE)
-        theta = np.asarray(self._draws["theta"][:upto])[whole]
-        points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self._recordings]
+        with damage_errors(self._path):
+            theta = np.asarray(self._draws["theta"][:upto])[whole]
+            points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self._recordings]
+        if not np.isfinite(theta).all() or not all(np.isfinite(p).all() for p in points):
+            raise StoreError(f"{self._path}: draws that were there are gone; move it away and run the fit again")
         return theta, points, whole
 
 

@@ -1,5 +1,6 @@
 """The step ``fit``: sequential simulation-based inference, then a least-squares polish."""
 
+import re
 import tempfile
 import time
 from collections import Counter
@@ -17,11 +18,13 @@ from ..core.measurement import Recording
 from ..core.parameters import ParameterSpace
 from ..core.registry import REGISTRY
 from ..core.series import PointSeries
-from ..core.store import put, read, storage_errors
+from ..core.store import damage_errors, put, read, storage_errors
 from ..core.study import Study, Task
+from .doubts import doubts
 from .draws import ABSENT, DrawStore
 from .noise import Noise, estimate_noise
 from .observe import Observer
+from .only_one import only_one
 from .polish import Objective, polish
 from .proposals import log_weights, propose
 from .residuals import Offsets, residual
@@ -41,6 +44,7 @@ class FitResult:
         samples: posterior draws ``(S, D)`` [units].
         noise: of the measurement.
         at_bound: parameters whose posterior is piled on a bound of the prior.
+        warnings: sentences on what makes these numbers doubtful.
         simulations: rollouts, the polish included.
         failed: draws that could not be simulated.
         seconds: of the run that finished the fit.
@@ -53,6 +57,7 @@ class FitResult:
     samples: FloatArray
     noise: Noise
     at_bound: tuple[str, ...]
+    warnings: tuple[str, ...]
     simulations: int
     failed: int
     seconds: float
@@ -74,6 +79,7 @@ class FitResult:
         lines.append(f"  noise {self.noise.sd * 1e3:.3g} mm a coordinate ({self.noise.source})")
         for name in self.at_bound:
             lines.append(f"  warning: {name} lies on a bound of its prior; widen [parameters.{name}] and fit again")
+        lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 
 
@@ -85,9 +91,15 @@ def offsets_of(study: Study) -> Offsets:
 def fit(study: Study) -> FitResult:
     """Fit a study: continue from the draws that its store has, or return the finished result."""
     problem, config = study.problem, study.config
-    rounds, per_round = config.estimator.rounds, config.estimator.draws
     noise = estimate_noise(problem, config.noise.sd)
     _estimator(study, [problem.recordings[r] for r in problem.fit_on])  # a wrong name or option is said now
+    with only_one(study.results_path):
+        return _fit(study, noise)
+
+
+def _fit(study: Study, noise: Noise) -> FitResult:
+    problem, config = study.problem, study.config
+    rounds, per_round = config.estimator.rounds, config.estimator.draws
     store = DrawStore(study, problem, rounds * per_round)
     if store.group.attrs.get("finished"):
         return load_fit(study)
@@ -118,6 +130,7 @@ def fit(study: Study) -> FitResult:
         objective = Objective(pool, units, problem.fit_on, noise, offsets_of(study))
         before = pool.count
         best = polish(objective, _best_draw(study, store, noise))
+        warnings = doubts(pool, units, best.unit, problem.fit_on[0], noise)
         simulations = rounds * per_round * len(problem.fit_on) + pool.count - before
     samples = density[-1].sample(SAMPLES, np.random.default_rng([config.study.seed, rounds]))
     estimate = units.from_unit(best.unit)
@@ -151,6 +164,7 @@ def fit(study: Study) -> FitResult:
                 "engine": problem.simulator.engine_version(),
                 "estimator": config.estimator.name,
                 "noise": noise.as_dict(),
+                "warnings": warnings,
                 "at_bound": [n for n, bad in zip(units.names, near, strict=True) if bad],
             }
         )
@@ -161,19 +175,21 @@ def fit(study: Study) -> FitResult:
 def load_fit(study: Study) -> FitResult:
     """The result of a finished fit."""
     group = study.step_results("fit")
-    a: dict[str, Any] = dict(group.attrs)
-    return FitResult(
-        names=tuple(a["parameters"]),
-        units=tuple(a["units"]),
-        estimate=read(group, "estimate"),
-        sd=read(group, "estimate_sd"),
-        samples=read(group, "posterior_samples"),
-        noise=Noise(**a["noise"]),
-        at_bound=tuple(a["at_bound"]),
-        simulations=int(a["simulations"]),
-        failed=int(a["failed"]),
-        seconds=float(a["seconds"]),
-    )
+    with damage_errors(study.results_path):
+        a: dict[str, Any] = dict(group.attrs)
+        return FitResult(
+            names=tuple(a["parameters"]),
+            units=tuple(a["units"]),
+            estimate=read(group, "estimate"),
+            sd=read(group, "estimate_sd"),
+            samples=read(group, "posterior_samples"),
+            noise=Noise(**a["noise"]),
+            at_bound=tuple(a["at_bound"]),
+            warnings=tuple(a["warnings"]),
+            simulations=int(a["simulations"]),
+            failed=int(a["failed"]),
+            seconds=float(a["seconds"]),
+        )
 
 
 def physical_sd(space: ParameterSpace, unit: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -225,7 +241,7 @@ def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:
 
 
 def _too_many_failed(store: DrawStore, count: int) -> str:
-    reasons = Counter(r.split(" at ")[0] for r in store.failures()).most_common(3)
+    reasons = Counter(re.sub(r"[-+]?\d[\d.e+-]*", "#", r) for r in store.failures()).most_common(3)
     return (
         f"{len(store.failures())} of {count} draws failed: "
         + "; ".join(f"{n} times {reason!r}" for reason, n in reasons)

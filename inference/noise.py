@@ -69,8 +69,9 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
     else:
         rough = np.concatenate([_fourth_difference(r) for r in recordings])
         if len(rough) < 20:
+            why = "so few frames" if any(r.series.correspondence for r in recordings) else "unordered points"
             raise InputError(
-                "the noise cannot be estimated from so few frames; give it in the study: [noise] sd = 0.003 (in metres)"
+                f"the noise cannot be estimated from {why}; give it in the study: [noise] sd = 0.003 (in metres)"
             )
         sd, correlation, source = float(1.4826 * np.median(np.abs(rough))), 0.0, "roughness in time"
         error = float(1.2 / np.sqrt(len(rough) / 2))

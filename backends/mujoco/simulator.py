@@ -28,7 +28,9 @@ _WARNINGS: deque[str] = deque(maxlen=1)
 def _engine() -> Any:
     try:
         import mujoco
-    except ImportError as error:
+    except ModuleNotFoundError as error:
+        if error.name != "mujoco":
+            raise
         raise BrokenPluginError(
             "simulator 'mujoco' needs the MuJoCo engine; install it with: pip install 'muslin[mujoco]'"
         ) from error

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ...core.errors import MuslinError
+from ...core.errors import InputError, MuslinError
 from ...core.store import write_text
 from ...core.study.study import Study
 
@@ -22,12 +22,15 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
 
     Raises:
         StepMissingError: the study has not been fitted.
+        InputError: ``after`` is about other recordings.
     """
     try:
         from .page import render
     except ImportError as error:
         raise _missing(error) from error
     path = output or study.path.with_name(f"{study.path.stem}.report.html")
+    if after is not None and after.fingerprint("compare")["measured"] != study.fingerprint("compare")["measured"]:
+        raise InputError(f"{after.path} is about other recordings than {study.path}; --after takes a study made by add")
     page = render(study, after)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, page)

@@ -89,7 +89,7 @@ def context(found: Findings) -> Table:
 def paragraphs(found: Findings, told: str) -> list[str]:
     """What the diagnosis says beyond what is on top of the page."""
     rest = found.paragraphs[1:] if (found.diagnose or {}).get("verdict") == "named" else found.paragraphs
-    return [p for p in rest if p != told and not p.startswith("Add it with")]
+    return [p for p in rest if p != told]
 
 
 def compared(found: Findings) -> str:

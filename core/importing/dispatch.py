@@ -65,6 +65,11 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
     points, si = to_si(take.points, unit, where)
     points = turned(points, options.up, where)
     told = [c for c in (options.correspondence, take.correspondence) if c is not None]
+    if gripper is not None and (gripper.times[-1] < take.time[0] or gripper.times[0] > take.time[-1]):
+        raise InputError(
+            f"{where}: the gripper poses go from {gripper.times[0]:g} to {gripper.times[-1]:g} s, the points from "
+            f"{take.time[0]:g} to {take.time[-1]:g} s; give both on the same clock"
+        )
     try:
         series = PointSeries(take.time, points, si, told[0] if told else True)
         load = options.load if options.load is not None else (take.load or 0.0)

@@ -13,11 +13,11 @@ from ..store import write_text
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 class _OpenTable(BaseModel):
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
 
     name: str
 
@@ -34,7 +34,7 @@ class StudyTable(_Table):
     fit_on: list[str] | None = None
     hold_out: list[str] = Field(default_factory=list)
     results: str | None = None
-    seed: int = 0
+    seed: int = Field(default=0, ge=0)
 
 
 class ScenarioTable(_Table):
@@ -103,6 +103,10 @@ class StudyConfig(_Table):
 
     @model_validator(mode="after")
     def _disjoint(self) -> "StudyConfig":
+        for key, names in (("fit_on", self.study.fit_on or []), ("hold_out", self.study.hold_out)):
+            twice = sorted({n for n in names if names.count(n) > 1})
+            if twice:
+                raise ValueError(f"{key} names {', '.join(twice)} twice")
         both = sorted(set(self.study.fit_on or []) & set(self.study.hold_out))
         if both:
             raise ValueError(f"recording {', '.join(both)} is both fitted on and held out")

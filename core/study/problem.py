@@ -1,7 +1,8 @@
 """A study resolved to something that can be simulated, small enough to send to worker processes."""
 
+import inspect
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ class Problem:
         Raises:
             RolloutFailed: see :func:`muslin.core.rollout.rollout`.
         """
-        fields: dict[str, float] = {}
+        given: dict[str, float] = {}
         coefficients: dict[str, dict[str, float]] = {}
         scale = 1.0
         for name, value in {**self.fixed, **values}.items():
@@ -63,10 +64,10 @@ class Problem:
                 effect, coefficient = name.split(".", 1)
                 coefficients.setdefault(effect, {})[coefficient] = float(value)
             else:
-                fields[name] = float(value)
+                given[name] = float(value)
         effects = [self.effects[name](**c) for name, c in coefficients.items()]
         trajectory = rollout(
-            self.simulator, self.scenarios[recording], with_fields(self.material, fields), effects, scale
+            self.simulator, self.scenarios[recording], with_fields(self.material, given), effects, scale
         )
         seen = self.extractor.extract(trajectory.series, trajectory.series.time)
         return replace(trajectory, series=seen)
@@ -106,9 +107,16 @@ def build_problem(config: StudyConfig, measurement: Measurement) -> Problem:
 def _plugin(kind: str, name: str, options: dict[str, Any]) -> Any:
     plugin = REGISTRY.get(kind, name)
     try:
-        return plugin(**options)
+        inspect.signature(plugin).bind(**options)
     except TypeError as error:
         raise InputError(f"[{kind}] {name!r} does not take these options: {error}") from error
+    try:
+        return plugin(**options)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        told = ", ".join(f"{k} = {v!r}" for k, v in options.items())
+        raise InputError(f"[{kind}] {name!r} cannot be made with {told}: {error}") from error
 
 
 def _keep_points(recording: Recording, points: list[int] | None) -> Recording:
@@ -131,7 +139,7 @@ def _scenario(config: StudyConfig, recording: Recording) -> Scenario:
         name=table.name,
         body=body,
         grasps=grasps,
-        motion=base.motion(),
+        motion=recording.gripper or base.motion(),
         times=recording.series.time,
         markers=np.eye(len(body.vertices)),
         load_vertices=base.load_vertices(body),
@@ -184,8 +192,8 @@ def _parameters(config: StudyConfig, kind: str, material: Material) -> tuple[Par
         return DEFAULT_PRIORS[kind]
     out = []
     for name, table in config.parameters.items():
-        if name != "scale" and not hasattr(material, name):
-            known = [*material.__dataclass_fields__, "scale"]
+        if name not in (*(f.name for f in fields(material)), "scale"):
+            known = [*(f.name for f in fields(material)), "scale"]
             raise InputError(f"[parameters.{name}]: unknown.{nearest(name, known)} Known: {', '.join(known)}")
         out.append(_parameter(name, table, UNITS.get(name, "1"), f"parameters.{name}"))
         for bound in (table.low, table.high):

@@ -12,7 +12,7 @@ from ..errors import InputError, StepMissingError
 from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
-from ..store import new_store, open_store
+from ..store import damage_errors, new_store, open_store
 from .config import StudyConfig, read_config, write_config
 from .pool import SimulationPool
 from .problem import Problem, build_problem
@@ -116,7 +116,9 @@ class Study:
         Raises:
             StepMissingError: it has not been run to its end, or not since the study or the measurement changed.
         """
-        group = self.results().get(step)
+        root = self.results()
+        with damage_errors(self.results_path):
+            group = root.get(step)
         if not isinstance(group, zarr.Group) or not group.attrs.get("finished"):
             raise StepMissingError(f"{self.path} has no result of {step!r} yet; run: muslin {step} {self.path}")
         if group.attrs.get("fingerprint") != self.fingerprint(step):

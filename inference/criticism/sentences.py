@@ -67,8 +67,6 @@ def explain(
     hidden = [c.name for c in evidence.candidates if not c.visible]
     if hidden:
         out.append(f"Not visible in these data, so neither ruled in nor out: {', '.join(sorted(hidden))}.")
-    if verdict in ("named", "tied"):
-        out.append(f"Add it with: muslin add {named[0]} STUDY.toml")
     return out
 
 

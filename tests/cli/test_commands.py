@@ -92,7 +92,7 @@ def test_an_interrupted_fit_says_that_it_goes_on(
     step("fit", interrupted)
     assert status("fit", str(study)) == 130
     err = capsys.readouterr().err
-    assert "run the same command to go on" in err and len(err.splitlines()) == 1
+    assert "goes on from what it has simulated" in err and len(err.splitlines()) == 1
 
 
 def test_an_error_behind_an_error_is_the_one_told(

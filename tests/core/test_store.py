@@ -56,7 +56,7 @@ def test_what_is_not_there(tmp_path: Path) -> None:
     with new_store(tmp_path / "a.zarr"):
         pass
     root = open_store(tmp_path / "a.zarr")
-    with pytest.raises(InputError, match="no array"):
+    with pytest.raises(StoreError, match="no array 'x'"):
         read(root, "x")
     with pytest.raises(InputError, match="no group 'g'"):
         subgroup(root, "g")

@@ -13,10 +13,13 @@ import xarray
 import zarr
 from small import TRUTH, small_measurement, write_study
 
-from muslin.core.errors import InputError, StepMissingError
+from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreError
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
+from muslin.inference.doubts import doubts
+from muslin.inference.noise import Noise
+from muslin.inference.only_one import only_one
 
 pytest.importorskip("mujoco")
 
@@ -146,3 +149,32 @@ def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(small_stu
     with pytest.raises(InputError, match="no_such_option"):
         Study(config, small_study.path, workers=1).fit()
     assert not small_study.results_path.exists()
+
+
+@pytest.mark.parametrize("what", ["fit/zarr.json", "fit/estimate/c/0", "fit/posterior_samples/zarr.json"])
+def test_a_damaged_store_is_one_clear_error(small_study: Study, what: str) -> None:
+    small_study.fit()
+    (small_study.results_path / what).write_bytes(b"not what was written")
+    with pytest.raises(StoreError, match="damaged"):
+        Study.load(small_study.path, workers=1).compare()
+
+
+@pytest.mark.slow
+def test_two_fits_of_one_study_do_not_mix(small_study: Study) -> None:
+    with only_one(small_study.results_path), pytest.raises(MuslinError, match="another fit"):
+        small_study.fit()
+    assert small_study.fit().failed == 0
+
+
+def test_chaos_is_said(tmp_path: Path) -> None:
+    """Undamped cloth on an explicit engine moves with a change in the ninth digit; whether that matters, the noise says."""
+    pytest.importorskip("pybullet")
+    path = write_study(tmp_path, small_measurement(), fit_on=["far"], hold_out=[])
+    path.write_text(path.read_text().replace('"mujoco"', '"pybullet"').replace("time_step = 0.01", "time_step = 0.005"))
+    study = Study.load(path, workers=1)
+    space, noise = study.problem.space, Noise(1e-9, 0.0, "test", "m", 0.01)
+    with study.pool() as pool:
+        said = doubts(pool, space, np.full(len(space), 0.5), "far", noise)
+    assert any("chaotic" in s for s in said)
+    with study.pool() as pool:
+        assert not doubts(pool, space, np.full(len(space), 0.5), "far", Noise(1.0, 0.0, "test", "m", 0.01))
