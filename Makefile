@@ -6,25 +6,29 @@
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
-READY  := $(VENV)/.ready
+PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
 .PHONY: demo test lint bench bench-hidden-small clean
 
-$(READY): pyproject.toml constraints.txt
+# what the demo needs; tests and linters need a little more
+$(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "setting up $(VENV) (about a minute, torch as a CPU build)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/pip install --quiet --disable-pip-version-check --upgrade pip 2>/dev/null
-	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[all,dev]' 2>/dev/null \
-		|| $(BIN)/pip install -c constraints.txt -e '.[all,dev]'
+	@$(PIP) install -c constraints.txt -e '.[all]' 2>/dev/null || $(BIN)/pip install -c constraints.txt -e '.[all]'
 	@touch $@
 
-demo: $(READY)
+$(VENV)/.ready-dev: $(VENV)/.ready
+	@echo "adding what tests and linters need"
+	@$(PIP) install -c constraints.txt -e '.[all,dev]' 2>/dev/null || $(BIN)/pip install -c constraints.txt -e '.[all,dev]'
+	@touch $@
+
+demo: $(VENV)/.ready
 	@$(BIN)/python examples/demo.py
 
-test: $(READY)
+test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-lint: $(READY)
+lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	@rm -rf build/types && mkdir -p build/types/muslin
@@ -34,7 +38,7 @@ lint: $(READY)
 
 bench: bench-hidden-small
 
-bench-hidden-small: $(READY)
+bench-hidden-small: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/hidden_small.py
 
 clean:

@@ -142,8 +142,6 @@ _EXTRAS = {
     "pybullet": "pybullet",
     "torch": "torch",
     "scipy": "torch",
-    "cv2": "perception",
-    "trimesh": "perception",
     "matplotlib": "report",
     "jinja2": "report",
     "ezc3d": "mocap",

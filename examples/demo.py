@@ -16,14 +16,14 @@ ROOT = Path(__file__).resolve().parent.parent
 DEMO = ROOT / "demo"
 
 #: Takes of the beam: file, name, motion and load [kg], and the window [s] from the release, seen as the
-#: first frame in which the tip falls, on for 1.3 s. Recorded by Dubied et al., see beam/README.md.
+#: first frame in which the tip falls, on for 1.1 s. Recorded by Dubied et al., see beam/README.md.
 BEAM = [
-    ("gravity_V2_a", "gravity-a", "gravity", 0.0, 0.71, 2.00),
-    ("gravity_V2_b", "gravity-b", "gravity", 0.0, 0.65, 1.94),
-    ("load52_V2_a", "load52-a", "load52", 0.052, 0.43, 1.72),
-    ("load52_V2_b", "load52-b", "load52", 0.052, 0.58, 1.87),
-    ("load101_V2_a", "load101-a", "load101", 0.101, 0.51, 1.80),
-    ("load101_V2_b", "load101-b", "load101", 0.101, 0.56, 1.85),
+    ("gravity_V2_a", "gravity-a", "gravity", 0.0, 0.71, 1.80),
+    ("gravity_V2_b", "gravity-b", "gravity", 0.0, 0.65, 1.74),
+    ("load52_V2_a", "load52-a", "load52", 0.052, 0.43, 1.52),
+    ("load52_V2_b", "load52-b", "load52", 0.052, 0.58, 1.67),
+    ("load101_V2_a", "load101-a", "load101", 0.101, 0.51, 1.60),
+    ("load101_V2_b", "load101-b", "load101", 0.101, 0.56, 1.65),
 ]
 
 

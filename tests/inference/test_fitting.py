@@ -167,7 +167,7 @@ def test_two_fits_of_one_study_do_not_mix(small_study: Study) -> None:
 
 
 def test_chaos_is_said(tmp_path: Path) -> None:
-    """Undamped cloth on an explicit engine moves with a change in the ninth digit; whether that matters, the noise says."""
+    """Undamped cloth on an explicit engine feels a change in the ninth digit; the noise says whether it matters."""
     pytest.importorskip("pybullet")
     path = write_study(tmp_path, small_measurement(), fit_on=["far"], hold_out=[])
     path.write_text(path.read_text().replace('"mujoco"', '"pybullet"').replace("time_step = 0.01", "time_step = 0.005"))
