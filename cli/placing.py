@@ -94,7 +94,7 @@ def doubtful_starts(problem: Problem) -> list[str]:
     remarks = []
     for name, recording in problem.recordings.items():
         scenario = problem.scenarios[name]
-        moves = len(preset(scenario.name).motion().times) > 1
+        moves = bool(np.ptp(preset(scenario.name).motion().poses, axis=0).any())
         if recording.gripper is None and moves and scenario.grasps:
             remarks.append(
                 f"warning: {name} has no gripper poses, so the built-in motion of {scenario.name!r} is taken; import "

@@ -142,6 +142,7 @@ _EXTRAS = {
     "pybullet": "pybullet",
     "torch": "torch",
     "scipy": "torch",
+    "filelock": "torch",
     "matplotlib": "report",
     "jinja2": "report",
     "ezc3d": "mocap",

@@ -1,7 +1,9 @@
 """Many rollouts over worker processes; results in order, failures as values."""
 
 import os
+import pickle
 import signal
+import tempfile
 import threading
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -9,6 +11,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 from types import TracebackType
 
 from threadpoolctl import threadpool_limits
@@ -38,9 +41,9 @@ Outcome = Trajectory | Failure
 _PROBLEM: Problem | None = None
 
 
-def _start_worker(problem: Problem) -> None:
+def _start_worker(file: str) -> None:
     global _PROBLEM
-    _PROBLEM = problem
+    _PROBLEM = pickle.loads(Path(file).read_bytes())
     # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # One thread of linear algebra a process: more only get in each other's way, and the order in which
@@ -78,9 +81,9 @@ _NO_WORKERS = (
 )
 
 
-def _executor(workers: int, problem: Problem) -> ProcessPoolExecutor:
+def _executor(workers: int, file: str) -> ProcessPoolExecutor:
     # spawn: a fork of a process with engine or torch threads may hang
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(problem,))
+    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(file,))
 
 
 class SimulationPool:
@@ -96,6 +99,7 @@ class SimulationPool:
         self.workers = workers if workers is not None else (os.cpu_count() or 1)
         self.count = 0  # rollouts run
         self._executor: ProcessPoolExecutor | None = None
+        self._file: str | None = None
 
     def __enter__(self) -> "SimulationPool":
         return self
@@ -106,10 +110,29 @@ class SimulationPool:
         if self._executor is not None:
             self._executor.shutdown(wait=True, cancel_futures=True)
             self._executor = None
+        if self._file is not None:
+            Path(self._file).unlink(missing_ok=True)
+            self._file = None
+
+    def _travel(self) -> str:
+        """The problem in a file for workers to read.
+
+        Given as an argument it would have to fit into a pipe: Python waits for ever when a process dies
+        before it has read all of a larger one, as happens in a script without a main guard.
+        """
+        if self._file is None:
+            try:
+                content = pickle.dumps(self.problem)
+            except (pickle.PicklingError, AttributeError, TypeError) as error:
+                raise MuslinError(f"{_NO_WORKERS} ({error})") from error
+            with tempfile.NamedTemporaryFile(prefix="muslin-", suffix=".problem", delete=False) as file:
+                file.write(content)
+            self._file = file.name
+        return self._file
 
     def _open(self) -> ProcessPoolExecutor:
         if self._executor is None:
-            self._executor = _executor(self.workers, self.problem)
+            self._executor = _executor(self.workers, self._travel())
         return self._executor
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
@@ -151,7 +174,7 @@ class SimulationPool:
             MuslinError: no worker process can start at all.
         """
         self._drop()
-        executor = _executor(1, self.problem)
+        executor = _executor(1, self._travel())
         try:
             try:
                 executor.submit(_ready).result()

@@ -1,14 +1,9 @@
 """Least squares over a simulator that sometimes fails: what is not known stays as wide as the prior."""
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
 
 from muslin.core.arrays import FloatArray
-from muslin.core.errors import MuslinError
 from muslin.core.parameters import Parameter, ParameterSpace
-from muslin.core.study import SimulationPool, Study
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, polish
 from muslin.inference.residuals import Offsets
@@ -40,16 +35,3 @@ def test_a_neighbour_that_fails_does_not_pass_for_certainty() -> None:
     np.testing.assert_allclose(slope, objective.matrix, rtol=1e-6)
     objective.wall = 0.001  # one side fails, the other is outside the cube
     assert not objective.jacobian(np.array([0.001, 0.5]))[:, 0].any()
-
-
-@pytest.mark.slow
-def test_workers_that_cannot_start_are_one_clear_error(small_study: Study) -> None:
-    class Local:  # cannot be pickled, as a plugin made in a notebook
-        pass
-
-    problem = replace(small_study.problem, effects={"local": Local})  # type: ignore[dict-item]
-    with SimulationPool(problem, 2) as pool, pytest.raises((MuslinError, AttributeError, TypeError)):
-        list(pool.map([]))
-        from muslin.core.study import Task
-
-        list(pool.map([Task({"stretch_stiffness": 100.0, "bending_rigidity": 1e-5}, "near")]))
