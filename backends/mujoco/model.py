@@ -64,8 +64,10 @@ def mjcf(scene: Scene, time_step: float) -> str:
     parts = f' dof="quadratic" cellcount="{cells[0]} {cells[1]} {cells[2]}"' if cells else ""
     contact = scene.table_height is not None
     # the stiffest contact that a time step allows (solref: time constant, damping ratio)
+    # vertices collide as spheres: a table lower by their radius carries the vertices themselves at its height
     touch = f'friction="{m.friction:.17g} 0 0" solref="{2 * time_step:.17g} 1"'
-    table = f'<geom type="plane" size="5 5 0.1" pos="0 0 {scene.table_height:.17g}" {touch}/>' if contact else ""
+    height = (scene.table_height or 0.0) - RADIUS
+    table = f'<geom type="plane" size="5 5 0.1" pos="0 0 {height:.17g}" {touch}/>' if contact else ""
     points = " ".join(f"{x:.17g}" for x in body.vertices.ravel())
     elements = " ".join(str(i) for i in body.elements.ravel())
     gravity = " ".join(f"{g:.17g}" for g in scene.gravity)
