@@ -19,7 +19,7 @@ NOWHERE = np.zeros((0, 3))
 SMALL_CLOTH = cloth_grid(0.2, 0.2, 4, 4)
 SMALL_SOLID = solid_box(np.zeros(3), np.array([0.04, 0.03, 0.03]), (3, 3, 3))
 
-# The beam that issue 2 fits: 0.1 x 0.03 x 0.03 m of silicone.
+# The beam of the demo: 0.1 x 0.03 x 0.03 m of silicone.
 E, NU, L, H, RHO = 264e3, 0.3, 0.1, 0.03, 1070.0
 AREA, INERTIA, SHEAR = H * H, H**4 / 12, E / 2 / (1 + NU)
 
