@@ -98,9 +98,5 @@ class ParameterSpace:
         x = low + np.asarray(unit, float) * (high - low)
         return np.asarray(np.where(log, np.exp(np.where(log, x, 0.0)), x))
 
-    def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """``(count, D)`` draws from the prior."""
-        return self.from_unit(rng.random((count, len(self))))
-
     def as_dict(self, values: FloatArray | Sequence[float]) -> dict[str, float]:
         return {n: float(v) for n, v in zip(self.names, np.asarray(values, float), strict=True)}

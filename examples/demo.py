@@ -64,17 +64,22 @@ def hidden_effect() -> Path:
     return study(folder)
 
 
-def beam() -> Path:
-    """The beam: motion capture of a real object, from its C3D files."""
-    folder = DEMO / "beam"
-    folder.mkdir(parents=True)
-    shutil.copy(ROOT / "examples/beam/study.toml", folder)
+def import_beam(folder: Path) -> None:
+    """All takes of the beam into one measurement, from their C3D files."""
     arguments = ["import", *(str(ROOT / f"examples/beam/data/beam_{take}.c3d") for take, *_ in BEAM)]
     for _, name, motion, load, start, stop in BEAM:
         arguments += ["--name", name, "--motion", motion, "--load", f"{load:g}"]
         arguments += ["--start", f"{start:g}", "--stop", f"{stop:g}"]
     shown = "import beam_*.c3d --up x --name … --motion … --load … --start … --stop … -o beam.zarr"
     muslin(folder, *arguments, "--up", "x", "-o", "beam.zarr", shown=shown)
+
+
+def beam() -> Path:
+    """The beam: motion capture of a real object."""
+    folder = DEMO / "beam"
+    folder.mkdir(parents=True)
+    shutil.copy(ROOT / "examples/beam/study.toml", folder)
+    import_beam(folder)
     return study(folder)
 
 

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import mujoco
 
 #: Inertia of a held vertex relative to the heaviest one. Held vertices are set to their command after
-#: every step; the inertia keeps elastic forces from moving them within the step. With 1e3 they still yield,
-#: by h^2 K + h beta K against it: a beam sagged 1 to 3 % more the more it was damped. Costs nothing.
+#: every step; the inertia keeps elastic forces from moving them within the step. They yield
+#: by h^2 K + h beta K against it: with too little of it, where an object rests depends on its damping.
 HELD_INERTIA = 1e6
 
 

@@ -14,7 +14,7 @@ class ClothWorld(SoftWorld):
 
     Bullet's own springs are off. They have one stiffness for all edges, which makes a square grid with
     alternating diagonals an isotropic sheet of Poisson ratio 1/3 with E t = 4/3 k, but only inside: free
-    edges, which carry half a cell, come out twice too stiff (9 % more for a strip of 8 cells), other cells are
+    edges, which carry half a cell, come out twice too stiff, other cells are
     anisotropic, no other Poisson ratio exists, and vertices at the rim are as heavy as the others. Its
     bending springs have no linear bending rigidity. See :class:`SoftWorld` for what Bullet does do.
     """

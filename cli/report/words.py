@@ -9,7 +9,6 @@ from .findings import Findings, Table, number
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 NBSP = "\u00a0"
-_UNSEEN = ("cannot", "could not", "not seen", "not visible", "unseen", "invisible")
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
@@ -107,19 +106,13 @@ def coefficients(candidate: Table) -> list[str]:
 
 def unseen(candidate: Table) -> bool:
     """These data could not have shown this candidate."""
-    said = candidate.get("identifiability")
-    if isinstance(said, str):
-        return any(w in said.lower() for w in _UNSEEN)
-    own = number(said)
+    own = number(candidate.get("identifiability"))
     return own <= 0.0 if own is not None else candidate.get("z") is None
 
 
 def identifiability(candidate: Table) -> str:
     """How well these data can show a candidate."""
-    said = candidate.get("identifiability")
-    if isinstance(said, str):
-        return said
-    own = number(said)
+    own = number(candidate.get("identifiability"))
     if unseen(candidate):
         return "no: too weak, or hidden by the parameters"
     return "–" if own is None else f"yes: {share(own)} of its trace is unlike the parameters"

@@ -140,9 +140,10 @@ class SimulationPool:
         tasks = list(tasks)
         self.count += len(tasks)
         if self.workers == 1:
-            with threadpool_limits(1):
-                for task in tasks:
-                    yield _run(self.problem, task)
+            for task in tasks:
+                with threadpool_limits(1):  # not across the yield: what the caller does is not ours to limit
+                    outcome = _run(self.problem, task)
+                yield outcome
             return
         futures: list[Future[Outcome]] = [self._submit(t) for t in tasks]
         for k, future in enumerate(futures):

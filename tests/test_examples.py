@@ -1,0 +1,59 @@
+"""The examples: their studies resolve, and the recording in the repository is what its script makes."""
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from muslin.core.measurement_store import load_measurement, read_hidden
+from muslin.core.study import Study
+
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def module(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
+
+
+def test_the_hidden_effect_recording_is_what_its_script_makes(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    folder = EXAMPLES / "hidden_effect"
+    again = tmp_path / "again.zarr"
+    subprocess.run([sys.executable, str(folder / "make_recording.py"), "-o", str(again)], check=True, cwd=tmp_path)
+    made, kept = load_measurement(again), load_measurement(folder / "recording.zarr")
+    assert made.names == kept.names
+    assert read_hidden(again) == read_hidden(folder / "recording.zarr")
+    for name in made.names:
+        np.testing.assert_allclose(made[name].series.points, kept[name].series.points, atol=1e-6)
+
+
+def test_the_hidden_effect_study_resolves() -> None:
+    pytest.importorskip("mujoco")
+    problem = Study.load(EXAMPLES / "hidden_effect/study.toml").problem
+    assert problem.fit_on == ("fling", "swing") and problem.hold_out == ("fling-wide",)
+    assert problem.space.names == ("stretch_stiffness", "bending_rigidity")
+
+
+def test_the_beam_is_imported_and_its_study_resolves(tmp_path: Path) -> None:
+    """With the very command that the demo runs; the model's markers start where the real ones do."""
+    pytest.importorskip("mujoco")
+    pytest.importorskip("ezc3d")
+    shutil.copy(EXAMPLES / "beam/study.toml", tmp_path)
+    demo = module(EXAMPLES / "demo.py")
+    demo.import_beam(tmp_path)
+    study = Study.load(tmp_path / "study.toml")
+    assert sorted(study.measurement.names) == sorted(name for _, name, *_ in demo.BEAM)
+    for name, recording in study.problem.recordings.items():
+        scenario = study.problem.scenarios[name]
+        start = scenario.markers @ scenario.world_vertices()
+        np.testing.assert_allclose(start, recording.series.points[0], atol=1e-6)
+        assert np.ptp(recording.series.points[:, :, 2], axis=0).min() > 0.005  # it was let go
