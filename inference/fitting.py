@@ -78,7 +78,9 @@ class FitResult:
             )
         lines.append(f"  noise {self.noise.sd * 1e3:.3g} mm a coordinate ({self.noise.source})")
         for name in self.at_bound:
-            lines.append(f"  warning: {name} lies on a bound of its prior: too narrow a prior, or it makes up for a missing effect")
+            lines.append(
+                f"  warning: {name} lies on a bound of its prior: the prior is too narrow, or an effect is missing"
+            )
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 
