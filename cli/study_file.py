@@ -78,7 +78,6 @@ def _scenario(plan: Plan) -> str:
     order = "row by row from the top edge, x rising" if cloth else "along x, y, z, z fastest"
     grasps = [[int(v) for v in g] for g in base.grasps(body)]
     points = f"points = {_value(plan.points)}" if plan.points is not None else "# points = [0, 1, 2]"
-    table = "# table_height = 0.0" if base.table_height is None else f"table_height = {base.table_height:g}"
     return f"""
 [scenario]
 name = {_value(plan.scenario)}
@@ -90,7 +89,8 @@ markers = {_value(plan.markers)}
 {points}  # measured points to compare, from 0; default all
 # grasps = {_value(grasps)}  # for every gripper the vertices that it holds
 settle = {base.settle:g}  # time to come to rest before the first frame [s]
-{table}  # height of a table under the object [m]
+# What stands around the object, in the world [m]; friction times the material's own is the Coulomb coefficient.
+# obstacles = [{{ kind = "table", height = 0.0, friction = 1.0 }}]
 """
 
 
@@ -125,7 +125,7 @@ def _material(kind: str) -> str:
         if field.name in inferred:
             lines.append(f"# {field.name} is inferred, see below")
         else:
-            lines.append(f"{field.name} = {_value(field.default)}  # [{UNITS[field.name]}]")
+            lines.append(f"{field.name} = {_value(field.default)}  # [{UNITS[kind][field.name]}]")
     return "\n".join([*lines, ""])
 
 

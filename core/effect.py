@@ -5,14 +5,23 @@ from collections.abc import Callable
 from typing import ClassVar, TypeAlias
 
 from .arrays import FloatArray
+from .body import Body
 from .errors import InputError
 from .material import Material
 from .motion import Motion
 from .parameters import Parameter
 from .scene import Scene
+from .simulator import State
 
-#: ``(time [s], positions (V, 3) [m], velocities (V, 3) [m/s]) -> nodal forces (V, 3) [N]``
-NodalForce: TypeAlias = Callable[[float, FloatArray, FloatArray], FloatArray]
+#: ``(time [s], state) -> nodal forces (V, 3) [N]``
+NodalForce: TypeAlias = Callable[[float, State], FloatArray]
+#: ``(time [s], state) -> factor (E,) on the stretch stiffness of every element``
+StiffnessFactor: TypeAlias = Callable[[float, State], FloatArray]
+#: ``(time [s], state, where the grippers take the held vertices (H, 3) [m]) -> where they really go (H, 3) [m]``
+GraspShift: TypeAlias = Callable[[float, State, FloatArray], FloatArray]
+
+
+ACTS_ON = ("force", "material", "gravity", "mass", "command", "grasp", "contact", "observation")
 
 
 class Effect(ABC):
@@ -29,10 +38,12 @@ class Effect(ABC):
     name: ClassVar[str]
     #: Coefficients with their unit and prior range. The range must contain zero or touch it.
     coefficients: ClassVar[tuple[Parameter, ...]]
-    #: What it acts on, for people: "force", "material", "gravity" or "command".
+    #: What it acts on, for people: one of :data:`ACTS_ON`.
     acts_on: ClassVar[str]
     #: Kinds of body for which it is meaningful.
-    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
+    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
+    #: What a simulator must be able to do for it, of :data:`muslin.core.simulator.CAPABILITIES`.
+    needs: ClassVar[frozenset[str]] = frozenset()
     #: One clause that completes "the object ...": what one sees when the effect is missing from a model.
     symptom: ClassVar[str] = "moves differently"
 
@@ -65,11 +76,33 @@ class Effect(ABC):
         """The motion that the grippers really make when told ``motion``; may resample it at ``time_step`` [s]."""
         return motion
 
+    def on_loads(self, body: Body, material: Material, loads: FloatArray) -> FloatArray:
+        """Extra point mass ``(V,)`` [kg] on the vertices, which weighs too; ``loads`` is what hangs there already."""
+        return loads
+
+    def on_clock(self, times: FloatArray) -> FloatArray:
+        """When the object really was as it was seen at ``times (T,)`` [s]; the earliest is the first of them."""
+        return times
+
+    def on_points(self, points: FloatArray) -> FloatArray:
+        """Where ``points (T, M, 3)`` [m] are seen by what measures them."""
+        return points
+
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:
         """The nodal force of this effect in ``scene``, or None if it acts in another way.
+
+        Called once a rollout: what it returns may remember what happened before in this rollout.
 
         Args:
             scene: material and gravity as all effects have left them.
             masses: lumped vertex masses ``(V,)`` [kg], loads included.
         """
+        return None
+
+    def bind_stiffness(self, scene: Scene) -> StiffnessFactor | None:
+        """How the stretch stiffness of elements changes during the rollout, or None; needs ``"varying-stiffness"``."""
+        return None
+
+    def bind_grasp(self, scene: Scene, masses: FloatArray) -> GraspShift | None:
+        """How the held vertices give way in the grippers, or None. Arguments as of :meth:`bind`."""
         return None

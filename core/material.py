@@ -12,16 +12,32 @@ def _check(material: "Material") -> None:
         value = getattr(material, f.name)
         if not value >= 0 or value == float("inf"):
             raise InputError(f"material: {f.name} must be finite and not negative, but is {value!r}")
-    for name in ("areal_density", "density", "stretch_stiffness", "youngs_modulus"):
+    for name in _POSITIVE:
         if getattr(material, name, 1.0) <= 0:
             raise InputError(f"material: {name} must be above zero, but is {getattr(material, name)!r}")
-    if material.poisson_ratio >= 0.5:
+    if not isinstance(material, RopeMaterial) and material.poisson_ratio >= 0.5:
         raise InputError(f"material: poisson_ratio must be below 0.5, but is {material.poisson_ratio:g}")
+
+
+_POSITIVE = (
+    "areal_density",
+    "linear_density",
+    "density",
+    "diameter",
+    "stretch_stiffness",
+    "youngs_modulus",
+    "weft_stretch_ratio",
+    "weft_bending_ratio",
+)
 
 
 @dataclass(frozen=True)
 class ClothMaterial:
-    """A thin sheet, isotropic.
+    """A thin sheet, isotropic or woven.
+
+    With a ratio r of weft over warp the stiffness along the warp is S / sqrt(r) and along the weft S sqrt(r),
+    so that S is their geometric mean; shear stays S / (2 (1 + nu)) and nu is the geometric mean of both
+    Poisson ratios.
 
     Args:
         areal_density: mass per area [kg/m2].
@@ -29,7 +45,9 @@ class ClothMaterial:
         bending_rigidity: D [N m], moment per length and curvature.
         poisson_ratio: in-plane [1].
         damping_time: stiffness-proportional damping, the beta of C = beta K [s].
-        friction: Coulomb coefficient against the table [1].
+        friction: Coulomb coefficient against an obstacle of friction 1 [1].
+        weft_stretch_ratio: E t along the weft over that along the warp [1].
+        weft_bending_ratio: D along the weft over that along the warp [1].
     """
 
     areal_density: float = 0.15
@@ -38,6 +56,8 @@ class ClothMaterial:
     poisson_ratio: float = 0.3
     damping_time: float = 0.0
     friction: float = 0.3
+    weft_stretch_ratio: float = 1.0
+    weft_bending_ratio: float = 1.0
 
     kind: ClassVar[str] = "cloth"
 
@@ -51,6 +71,39 @@ class ClothMaterial:
 
 
 @dataclass(frozen=True)
+class RopeMaterial:
+    """A rope, cable or rod.
+
+    Args:
+        linear_density: mass per length [kg/m].
+        stretch_stiffness: Young's modulus times cross-section, E A [N].
+        bending_rigidity: E I [N m2], moment per curvature.
+        twist_rigidity: G J [N m2], torque per twist rate.
+        diameter: of its round cross-section, for contact and drag [m].
+        damping_time: stiffness-proportional damping, the beta of C = beta K [s].
+        friction: Coulomb coefficient against an obstacle of friction 1 [1].
+    """
+
+    linear_density: float = 0.05
+    stretch_stiffness: float = 500.0
+    bending_rigidity: float = 1e-4
+    twist_rigidity: float = 1e-4
+    diameter: float = 0.008
+    damping_time: float = 0.0
+    friction: float = 0.3
+
+    kind: ClassVar[str] = "rope"
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def density(self) -> float:
+        """Mass per measure of an element (length) [kg/m]."""
+        return self.linear_density
+
+
+@dataclass(frozen=True)
 class SolidMaterial:
     """An isotropic elastic solid.
 
@@ -60,7 +113,7 @@ class SolidMaterial:
         poisson_ratio: [1]. Values near 0.5 lock coarse meshes; the bending of a slender body hardly
             depends on it.
         damping_time: stiffness-proportional damping, the beta of C = beta K [s].
-        friction: Coulomb coefficient against the table [1].
+        friction: Coulomb coefficient against an obstacle of friction 1 [1].
     """
 
     density: float = 1070.0
@@ -75,37 +128,54 @@ class SolidMaterial:
         _check(self)
 
 
-Material: TypeAlias = ClothMaterial | SolidMaterial
+Material: TypeAlias = ClothMaterial | RopeMaterial | SolidMaterial
 
-MATERIALS: dict[str, type[ClothMaterial] | type[SolidMaterial]] = {
+MATERIALS: dict[str, type[ClothMaterial] | type[RopeMaterial] | type[SolidMaterial]] = {
     "cloth": ClothMaterial,
+    "rope": RopeMaterial,
     "solid": SolidMaterial,
 }
 
 #: What a study infers when it says nothing else: the material fields with wide, physical priors.
-#: Cloth: the ten fabrics of Wang, O'Brien and Ramamoorthi (2011), widened. Solid: soft silicones.
+#: Cloth: the ten fabrics of Wang, O'Brien and Ramamoorthi (2011), widened. Rope: from yarn-soft lines to
+#: jacketed cables of a few millimetres. Solid: soft silicones.
 DEFAULT_PRIORS: dict[str, tuple[Parameter, ...]] = {
     "cloth": (
         Parameter("stretch_stiffness", "N/m", 30.0, 3000.0, "log", "Young's modulus times thickness"),
         Parameter("bending_rigidity", "N m", 2e-6, 5e-4, "log", "moment per length and curvature"),
     ),
+    "rope": (
+        Parameter("bending_rigidity", "N m2", 1e-6, 1e-2, "log", "moment per curvature"),
+        Parameter("stretch_stiffness", "N", 50.0, 5000.0, "log", "Young's modulus times cross-section"),
+    ),
     "solid": (Parameter("youngs_modulus", "Pa", 5e4, 1.5e6, "log", "Young's modulus"),),
 }
 
-UNITS = {
-    "areal_density": "kg/m2",
-    "density": "kg/m3",
-    "stretch_stiffness": "N/m",
-    "bending_rigidity": "N m",
-    "youngs_modulus": "Pa",
-    "poisson_ratio": "1",
-    "damping_time": "s",
-    "friction": "1",
-    "scale": "1",
+_SHARED_UNITS = {"damping_time": "s", "friction": "1", "scale": "1"}
+#: Unit of every material field, and of the object's scale, by kind of object.
+UNITS: dict[str, dict[str, str]] = {
+    "cloth": {
+        "areal_density": "kg/m2",
+        "stretch_stiffness": "N/m",
+        "bending_rigidity": "N m",
+        "poisson_ratio": "1",
+        "weft_stretch_ratio": "1",
+        "weft_bending_ratio": "1",
+        **_SHARED_UNITS,
+    },
+    "rope": {
+        "linear_density": "kg/m",
+        "stretch_stiffness": "N",
+        "bending_rigidity": "N m2",
+        "twist_rigidity": "N m2",
+        "diameter": "m",
+        **_SHARED_UNITS,
+    },
+    "solid": {"density": "kg/m3", "youngs_modulus": "Pa", "poisson_ratio": "1", **_SHARED_UNITS},
 }
 
 
-M = TypeVar("M", bound=ClothMaterial | SolidMaterial)
+M = TypeVar("M", bound=ClothMaterial | RopeMaterial | SolidMaterial)
 
 
 def with_fields(material: M, values: dict[str, float]) -> M:

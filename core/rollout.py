@@ -1,21 +1,22 @@
 """The shared effect loop: one rollout of any simulator with any effects."""
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
 from .arrays import FloatArray
 from .effect import Effect
-from .errors import RolloutFailed
+from .errors import InputError, RolloutFailed
 from .interpolation import interpolate
 from .material import Material
+from .sanity import SanityCheck
 from .scenario import STANDARD_GRAVITY, Scenario
 from .series import PointSeries
-from .simulator import Simulator
+from .simulator import CAPABILITIES, Simulator
 
-#: An edge longer than this times its rest length means that the rollout blew up without saying so.
-LARGEST_STRETCH = 3.0
 #: Rate of the artificial damping while an object comes to rest before the first observation [1/s].
 SETTLE_RATE = 8.0
 #: Step at which an effect may resample a command [s].
@@ -31,11 +32,13 @@ class Trajectory:
         series: the observed markers.
         vertices: ``(T, V, 3)`` [m] at the observation times.
         poses: gripper poses really made ``(T, G, 7)``.
+        seconds: that the computation took [s].
     """
 
     series: PointSeries
     vertices: FloatArray
     poses: FloatArray
+    seconds: float = 0.0
 
 
 def rollout(
@@ -44,6 +47,7 @@ def rollout(
     material: Material,
     effects: Sequence[Effect] = (),
     scale: float = 1.0,
+    time_limit: float | None = None,
 ) -> Trajectory:
     """Simulate ``scenario`` once.
 
@@ -51,54 +55,86 @@ def rollout(
     bit for bit. The object starts where the grippers really are, after what effects make of their
     command. Observations between two steps are interpolated linearly.
 
+    Args:
+        simulator: that steps the world.
+        scenario: what happens.
+        material: of the object.
+        effects: in any order; where several act on the same thing, one acts on what the other left.
+        scale: of the object's size [1].
+        time_limit: seconds of computation after which it is given up, or None.
+
     Raises:
-        RolloutFailed: the engine failed, a position is not finite, or an edge is stretched beyond
-            :data:`LARGEST_STRETCH`.
+        InputError: the simulator cannot build this, or cannot do what an effect needs.
+        RolloutFailed: the engine failed, it took too long, or the state makes no sense
+            (:class:`~muslin.core.sanity.SanityCheck`).
     """
+    started = time.monotonic()
+    deadline = np.inf if time_limit is None else started + time_limit
     active = [e for e in effects if not e.is_off]
     gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
     for effect in active:
+        _check_needs(effect, simulator)
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
         scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
     scene = scenario.scene(material, gravity, scale)
+    for effect in active:
+        scene = replace(scene, loads=effect.on_loads(scene.body, material, scene.loads))
+    seen = reduce(lambda times, effect: effect.on_clock(times), active, scenario.times)
     simulator.check(scene)
     world = simulator.open(scene)
     try:
         dt = world.time_step
         forces = [f for f in (e.bind(scene, world.masses) for e in active) if f is not None]
+        factors = [f for f in (e.bind_stiffness(scene) for e in active) if f is not None]
+        shifts = [f for f in (e.bind_grasp(scene, world.masses) for e in active) if f is not None]
         settle_steps = int(np.ceil(scenario.settle / dt - 1e-9))
-        start, end = scenario.times[0], scenario.times[-1]
+        start, end = scenario.times[0], max(scenario.times[-1], seen[-1])
         steps = int(np.ceil((end - start) / dt - 1e-9))
         clock = start + dt * np.arange(-settle_steps, steps + 1)
-        held = scenario.held_positions(np.maximum(clock, start), scene.body.vertices)
-        rest = scene.body.edge_lengths(scene.body.vertices)
+        held = scenario.held_positions(np.maximum(clock, start), scene.start_positions)
+        sane = SanityCheck(scene)
+        brake = -SETTLE_RATE * world.masses[:, None]
         path = np.empty((steps + 1, len(scene.body.vertices), 3))
-        for k, time in enumerate(clock):
+        for k, now in enumerate(clock.tolist()):
             state = world.state()
             if k >= settle_steps:
                 path[k - settle_steps] = state.positions
             if k % _CHECK_EVERY == 0 or k == len(clock) - 1:
-                _check(scene.body.edge_lengths(state.positions), rest, time)
+                sane(state.positions, now)
+                if time.monotonic() > deadline:
+                    raise RolloutFailed(f"took longer than {time_limit:g} s, and had come to {now:.3f} s")
             if k == len(clock) - 1:
                 break
             total: FloatArray | None = None
             for force in forces:
-                f = force(float(time), state.positions, state.velocities)
+                f = force(now, state)
                 total = f if total is None else total + f
             if k < settle_steps:
-                brake = -SETTLE_RATE * world.masses[:, None] * state.velocities
-                total = brake if total is None else total + brake
-            world.step(held[k + 1], total)
+                slow = brake * state.velocities
+                total = slow if total is None else total + slow
+            stiffness: FloatArray | None = None
+            for factor in factors:
+                s = factor(now, state)
+                stiffness = s if stiffness is None else stiffness * s
+            target = held[k + 1]
+            for shift in shifts:
+                target = shift(now, state, target)
+            if stiffness is None:
+                world.step(target, total)
+            else:
+                world.step(target, total, stiffness)
     finally:
         world.close()
-    vertices = interpolate(scenario.times, clock[settle_steps:], path)
+    vertices = interpolate(np.maximum(seen, start), clock[settle_steps:], path)
     points = np.einsum("mv,tva->tma", scenario.markers, vertices)
-    return Trajectory(PointSeries(scenario.times, points), vertices, scenario.motion.at(scenario.times))
+    for effect in active:
+        points = effect.on_points(points)
+    series, poses = PointSeries(scenario.times, points), scenario.motion.at(scenario.times)
+    return Trajectory(series, vertices, poses, time.monotonic() - started)
 
 
-def _check(lengths: FloatArray, rest: FloatArray, time: float) -> None:
-    worst = float(np.max(lengths / rest))
-    if not np.isfinite(worst):
-        raise RolloutFailed(f"positions are not finite at {time:.3f} s")
-    if worst > LARGEST_STRETCH:
-        raise RolloutFailed(f"an edge is stretched {worst:.1f} times at {time:.3f} s")
+def _check_needs(effect: Effect, simulator: Simulator) -> None:
+    for need in sorted(effect.needs - simulator.capabilities):
+        raise InputError(
+            f"effect {effect.name!r} needs a simulator that can {CAPABILITIES[need]}, but {simulator.name!r} cannot"
+        )

@@ -10,6 +10,7 @@ from .errors import InputError
 from .material import Material
 from .measurement import Recording
 from .motion import Motion, inverse, rotate
+from .obstacles import Obstacle
 from .scene import Scene
 
 STANDARD_GRAVITY = 9.80665
@@ -28,7 +29,9 @@ class Scenario:
         markers: weights ``(M, V)`` that give marker positions from vertex positions; rows sum to one.
         load_vertices: where a recording's load hangs, shared equally.
         load: [kg].
-        table_height: [m] or None.
+        obstacles: what stands around it, in the world.
+        start: where the vertices are before they settle ``(V, 3)`` [m], in the frame of the body; None: in the
+            rest shape.
         settle: time that the object is given to come to rest before the first observation [s].
     """
 
@@ -40,7 +43,8 @@ class Scenario:
     markers: FloatArray
     load_vertices: IntArray
     load: float = 0.0
-    table_height: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    start: FloatArray | None = None
     settle: float = 0.0
 
     def __post_init__(self) -> None:
@@ -74,28 +78,32 @@ class Scenario:
             )
         return replace(self, motion=motion, times=recording.series.time, load=recording.load)
 
-    @property
-    def held(self) -> IntArray:
-        return np.concatenate([np.asarray(g, np.int64) for g in self.grasps]) if self.grasps else np.zeros(0, np.int64)
-
     def world_vertices(self, scale: float = 1.0) -> FloatArray:
-        """Vertices ``(V, 3)`` [m] at the start; ``scale`` stretches about the first grasp."""
+        """Rest vertices ``(V, 3)`` [m] as held at the start; ``scale`` stretches about the first grasp."""
         about = self.body.vertices[self.grasps[0]].mean(axis=0) if self.grasps else self.body.vertices.mean(axis=0)
+        return self._in_world(self.body.scaled(scale, about).vertices)
+
+    def start_vertices(self, scale: float = 1.0) -> FloatArray:
+        """Where the vertices are before they settle ``(V, 3)`` [m]; a start of its own does not scale."""
+        return self.world_vertices(scale) if self.start is None else self._in_world(self.start)
+
+    def _in_world(self, points: FloatArray) -> FloatArray:
         pose = self.motion.at(self.times[:1])[0, 0]
-        return np.asarray(rotate(pose[3:], self.body.scaled(scale, about).vertices) + pose[:3])
+        return np.asarray(rotate(pose[3:], points) + pose[:3])
 
     def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
         body = replace(self.body, vertices=self.world_vertices(scale))
         loads = np.zeros(len(body.vertices))
         if self.load > 0:
             loads[self.load_vertices] = self.load / len(self.load_vertices)
-        return Scene(body, material, gravity, self.held, loads, self.table_height)
+        start = None if self.start is None else self.start_vertices(scale)
+        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start)
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
         """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].
 
         Args:
-            vertices: world positions at the start ``(V, 3)``, from :meth:`world_vertices`.
+            vertices: world positions at the start ``(V, 3)``, from :meth:`start_vertices`.
         """
         start = self.motion.at(self.times[:1])[0]
         poses = self.motion.at(times)

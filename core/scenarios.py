@@ -9,6 +9,7 @@ from .arrays import FloatArray, IntArray
 from .body import Body, cloth_grid, solid_box
 from .errors import InputError
 from .motion import Motion
+from .obstacles import Obstacle
 from .registry import nearest
 
 RATE = 100.0  # of built-in commands [Hz]
@@ -27,7 +28,7 @@ class Preset:
         grasps: of the body, vertices a gripper.
         load_vertices: where loads hang.
         settle: [s].
-        table_height: [m] or None.
+        obstacles: what stands around it.
     """
 
     kind: str
@@ -38,7 +39,7 @@ class Preset:
     load_vertices: Callable[[Body], IntArray] = field(default=lambda body: np.zeros(0, np.int64))
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     settle: float = 0.0
-    table_height: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
 
     def body(self, size: Sequence[float] | None = None, vertices: Sequence[int] | None = None) -> Body:
         size, counts = tuple(size or self.size), tuple(vertices or self.vertices)

@@ -1,10 +1,15 @@
 """A scene: everything an engine needs to build one world, resolved to numbers."""
 
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .body import Body
-from .material import Material
+from .errors import InputError
+from .material import Material, RopeMaterial
+from .obstacles import Obstacle
 
 
 @dataclass(frozen=True, eq=False)
@@ -12,17 +17,38 @@ class Scene:
     """One object in its surroundings at the start of a rollout, in the world frame (z up).
 
     Args:
-        body: the mesh at its start, which is also its rest shape; at rest at time zero.
+        body: the mesh in its rest shape, free of stress.
         material: in SI.
         gravity: ``(3,)`` [m/s2].
-        held: indices ``(H,)`` of the vertices that follow a command; may be empty.
+        grasps: for every gripper the vertices ``(H_g,)`` that follow its command; may be empty.
         loads: extra point mass on every vertex ``(V,)`` [kg].
-        table_height: height of a horizontal table [m], or None.
+        obstacles: what stands around it.
+        start: where the vertices are at time zero, at rest ``(V, 3)`` [m]; None: in the rest shape.
     """
 
     body: Body
     material: Material
     gravity: FloatArray
-    held: IntArray
+    grasps: tuple[IntArray, ...]
     loads: FloatArray
-    table_height: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    start: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.start is not None and self.start.shape != self.body.vertices.shape:
+            raise InputError(f"the start has shape {self.start.shape}, the mesh {self.body.vertices.shape}")
+
+    @cached_property
+    def held(self) -> IntArray:
+        """The vertices ``(H,)`` that follow a command, gripper by gripper."""
+        return np.concatenate([np.zeros(0, np.int64), *self.grasps]).astype(np.int64)
+
+    @property
+    def start_positions(self) -> FloatArray:
+        """Where the vertices are at time zero ``(V, 3)`` [m]."""
+        return self.body.vertices if self.start is None else self.start
+
+    @property
+    def contact_radius(self) -> float:
+        """How far from an obstacle's surface a vertex stays that touches it [m]."""
+        return self.material.diameter / 2 if isinstance(self.material, RopeMaterial) else 0.0

@@ -1,23 +1,55 @@
 """Simulators: what a backend owes."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import ClassVar
 
+import numpy as np
+
 from .arrays import FloatArray
+from .body import Body
 from .errors import InputError
+from .material import ClothMaterial
+from .obstacles import Cylinder, StaticMesh, Table
 from .scene import Scene
 
+#: What a simulator may be able to do beyond its kinds of body, and what that means.
+CAPABILITIES: dict[str, str] = {
+    "table": "carry the object on a table, with friction",
+    "cylinder": "carry the object on a cylinder, with friction",
+    "static-mesh": "carry the object on a closed mesh, with friction",
+    "anisotropy": "make cloth of different stiffness along warp and weft",
+    "curved-rest": "make an object whose rest shape is not flat or straight",
+    "start-shape": "start from a shape that is not the rest shape",
+    "twist": "make a rope that resists torsion",
+    "varying-stiffness": "change the stretch stiffness of elements during a rollout",
+    "contact-forces": "tell the forces of the obstacles on the vertices",
+}
 
-@dataclass(frozen=True, eq=False)
+
 class State:
     """Vertex positions ``(V, 3)`` [m] and velocities ``(V, 3)`` [m/s], in the order of ``scene.body``.
 
     The arrays may be views into the engine: read them before the next step, do not write them.
+
+    Args:
+        positions: ``(V, 3)`` [m].
+        velocities: ``(V, 3)`` [m/s].
+        contacts: gives the forces of the obstacles when asked; None: there are none.
     """
 
-    positions: FloatArray
-    velocities: FloatArray
+    __slots__ = ("_contacts", "positions", "velocities")
+
+    def __init__(
+        self, positions: FloatArray, velocities: FloatArray, contacts: Callable[[], FloatArray] | None = None
+    ) -> None:
+        self.positions = positions
+        self.velocities = velocities
+        self._contacts = contacts
+
+    def contact_forces(self) -> FloatArray:
+        """Forces ``(V, 3)`` [N] of the obstacles on the vertices, averaged over the last step."""
+        return np.zeros_like(self.positions) if self._contacts is None else self._contacts()
 
 
 class World(ABC):
@@ -32,13 +64,15 @@ class World(ABC):
     def state(self) -> State: ...
 
     @abstractmethod
-    def step(self, held: FloatArray, forces: FloatArray | None) -> None:
+    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
         """Advance by :attr:`time_step`.
 
         Args:
             held: where the held vertices must be at the end of the step ``(H, 3)`` [m]; they get there exactly.
             forces: nodal forces ``(V, 3)`` [N] acting through the step besides gravity, elasticity and
                 contact, or None for none. Those on held vertices have no effect.
+            stiffness: factor ``(E,)`` on the stretch stiffness of every element in this step, or None for one.
+                Only given to simulators that can do ``"varying-stiffness"``.
 
         Raises:
             RolloutFailed: the engine reports that it could not do the step.
@@ -58,6 +92,8 @@ class Simulator(ABC):
     name: ClassVar[str]
     #: Kinds of :class:`~muslin.core.body.Body` it can build.
     object_kinds: ClassVar[frozenset[str]]
+    #: Which of :data:`CAPABILITIES` it has.
+    capabilities: ClassVar[frozenset[str]] = frozenset()
 
     @abstractmethod
     def open(self, scene: Scene) -> World:
@@ -79,3 +115,26 @@ class Simulator(ABC):
             )
         if scene.material.kind != scene.body.kind:
             raise InputError(f"a {scene.body.kind} cannot be made of a {scene.material.kind} material")
+        missing = sorted(needed_capabilities(scene) - self.capabilities)
+        if missing:
+            raise InputError(f"simulator {self.name!r} cannot {' or '.join(CAPABILITIES[m] for m in missing)}")
+
+
+def needed_capabilities(scene: Scene) -> frozenset[str]:
+    """Which of :data:`CAPABILITIES` a simulator must have to build ``scene``."""
+    kinds = {Table: "table", Cylinder: "cylinder", StaticMesh: "static-mesh"}
+    needed = {kinds[type(o)] for o in scene.obstacles}
+    if scene.start is not None and not np.array_equal(scene.start, scene.body.vertices):
+        needed.add("start-shape")
+    material = scene.material
+    if isinstance(material, ClothMaterial) and (material.weft_stretch_ratio, material.weft_bending_ratio) != (1, 1):
+        needed.add("anisotropy")
+    if scene.body.kind != "solid" and not _is_straight(scene.body):
+        needed.add("curved-rest")
+    return frozenset(needed)
+
+
+def _is_straight(body: Body) -> bool:
+    """Whether the rest shape lies in one plane (cloth) or on one line (rope), to a millionth of its size."""
+    size = np.linalg.svd(body.vertices - body.vertices.mean(axis=0), compute_uv=False)
+    return bool(size[2 if body.kind == "cloth" else 1] <= 1e-6 * size[0])

@@ -4,6 +4,7 @@ import numpy as np
 
 from ...core.body import Body
 from ...core.material import ClothMaterial, SolidMaterial
+from ...core.obstacles import Table
 from ...core.scene import Scene
 
 #: Collision radius of a vertex [m]; not the shell's elastic thickness, which comes from the material.
@@ -62,11 +63,14 @@ def mjcf(scene: Scene, time_step: float) -> str:
     body, m = scene.body, scene.material
     cells = quadratic_cells(body)
     parts = f' dof="quadratic" cellcount="{cells[0]} {cells[1]} {cells[2]}"' if cells else ""
-    contact = scene.table_height is not None
+    tables = [o for o in scene.obstacles if isinstance(o, Table)]
+    contact = bool(tables)
     # the stiffest contact that a time step allows (solref: time constant, damping ratio)
     # vertices collide as spheres: a table lower by their radius carries the vertices themselves at its height
-    touch = f'friction="{m.friction:.17g} 0 0" solref="{2 * time_step:.17g} 1"'
-    height = (scene.table_height or 0.0) - RADIUS
+    touch = (
+        f'friction="{m.friction * (tables[0].friction if tables else 1.0):.17g} 0 0" solref="{2 * time_step:.17g} 1"'
+    )
+    height = (tables[0].height if tables else 0.0) - RADIUS
     table = f'<geom type="plane" size="5 5 0.1" pos="0 0 {height:.17g}" {touch}/>' if contact else ""
     points = " ".join(f"{x:.17g}" for x in body.vertices.ravel())
     elements = " ".join(str(i) for i in body.elements.ravel())

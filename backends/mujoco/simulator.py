@@ -53,6 +53,7 @@ class MujocoSimulator(Simulator):
 
     name: ClassVar[str] = "mujoco"
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
+    capabilities: ClassVar[frozenset[str]] = frozenset({"table"})
 
     def __init__(self, time_step: float = 0.005) -> None:
         if not 0 < time_step <= 0.05:
@@ -97,7 +98,7 @@ class MujocoWorld(World):
     def state(self) -> State:
         return State(self._rest + self._data.qpos.reshape(-1, 3), self._data.qvel.reshape(-1, 3))
 
-    def step(self, held: FloatArray, forces: FloatArray | None) -> None:
+    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
         data = self._data
         if forces is not None:
             if not np.isfinite(forces.sum()):  # MuJoCo would leave out the steps and say nothing

@@ -23,6 +23,7 @@ class PybulletSimulator(Simulator):
 
     name: ClassVar[str] = "pybullet"
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
+    capabilities: ClassVar[frozenset[str]] = frozenset({"table"})
 
     def __init__(self, *, time_step: float = 0.005, most_substeps: int = 500) -> None:
         if not 0 < time_step < float("inf"):

@@ -4,6 +4,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.material import SolidMaterial
+from ...core.obstacles import Table
 from ...core.scene import Scene
 from .client import MARGIN
 from .elasticity import Elasticity
@@ -39,7 +40,8 @@ class SolidWorld(SoftWorld):
         super().__init__(scene, time_step, most_substeps, elasticity, for_bullet)
         self._ratio = (self._equal_share / self.masses)[:, None]
         self._ratio[~self._free] = 1.0
-        self._touching_below = -np.inf if scene.table_height is None else scene.table_height + 0.5 * MARGIN
+        heights = [o.height for o in scene.obstacles if isinstance(o, Table)]
+        self._touching_below = max(heights, default=-np.inf) + 0.5 * MARGIN
 
     def _advance(
         self, positions: FloatArray, velocities: FloatArray, push: FloatArray, pull: FloatArray

@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.errors import RolloutFailed
+from ...core.obstacles import Table
 from ...core.scene import Scene
 from ...core.simulator import State, World
 from .client import Client
@@ -79,8 +80,9 @@ class SoftWorld(World):
 
         self._client = Client(self._dt)
         try:
-            if scene.table_height is not None:
-                self._client.add_table(scene.table_height, scene.material.friction)
+            for table in scene.obstacles:
+                assert isinstance(table, Table)
+                self._client.add_table(table.height, scene.material.friction * table.friction)
             with mesh_file(body) as path:
                 self._client.load(path, count * self._equal_share, count, lame)
             self._client.fix(scene.held)
@@ -92,7 +94,7 @@ class SoftWorld(World):
     def state(self) -> State:
         return State(self._positions, self._velocities)
 
-    def step(self, held: FloatArray, forces: FloatArray | None) -> None:
+    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
         push = self._weight if forces is None else self._weight + forces
         pull = (held - self._positions[self._held]) / self.time_step
         x, v = self._positions, self._velocities

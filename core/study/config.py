@@ -4,10 +4,12 @@ import tomllib
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..errors import InputError, MissingFileError
+from ..obstacles import Cylinder, Table
 from ..registry import nearest
 from ..store import write_text
 
@@ -37,6 +39,31 @@ class StudyTable(_Table):
     seed: int = Field(default=0, ge=0)
 
 
+class TableTable(_Table):
+    """An obstacle ``{ kind = "table", ... }``: see :class:`~muslin.core.obstacles.Table`."""
+
+    kind: Literal["table"]
+    height: float
+    friction: float = Field(default=1.0, ge=0)
+
+    def build(self) -> Table:
+        return Table(self.height, self.friction)
+
+
+class CylinderTable(_Table):
+    """An obstacle ``{ kind = "cylinder", ... }``: see :class:`~muslin.core.obstacles.Cylinder`."""
+
+    kind: Literal["cylinder"]
+    center: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    radius: float = Field(gt=0)
+    length: float = Field(gt=0)
+    friction: float = Field(default=1.0, ge=0)
+
+    def build(self) -> Cylinder:
+        return Cylinder(np.array(self.center), np.array(self.axis), self.radius, self.length, self.friction)
+
+
 class ScenarioTable(_Table):
     """``[scenario]``: the object and how it is held; every key but the name overrides a built-in."""
 
@@ -47,7 +74,7 @@ class ScenarioTable(_Table):
     markers: list[int] | Literal["all", "bound"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
-    table_height: float | None = None
+    obstacles: list[TableTable | CylinderTable] | None = None
 
 
 class EstimatorTable(_OpenTable):

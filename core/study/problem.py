@@ -143,7 +143,7 @@ def _scenario(config: StudyConfig, recording: Recording) -> Scenario:
         times=recording.series.time,
         markers=np.eye(len(body.vertices)),
         load_vertices=base.load_vertices(body),
-        table_height=base.table_height if table.table_height is None else table.table_height,
+        obstacles=base.obstacles if table.obstacles is None else tuple(o.build() for o in table.obstacles),
         settle=base.settle if table.settle is None else table.settle,
     ).for_recording(recording)
     return replace(plain, markers=_markers(table.markers, plain, recording))
@@ -195,7 +195,7 @@ def _parameters(config: StudyConfig, kind: str, material: Material) -> tuple[Par
         if name not in (*(f.name for f in fields(material)), "scale"):
             known = [*(f.name for f in fields(material)), "scale"]
             raise InputError(f"[parameters.{name}]: unknown.{nearest(name, known)} Known: {', '.join(known)}")
-        out.append(_parameter(name, table, UNITS.get(name, "1"), f"parameters.{name}"))
+        out.append(_parameter(name, table, UNITS[kind][name], f"parameters.{name}"))
         for bound in (table.low, table.high):
             _check_bound(material, name, bound)
     return tuple(out)

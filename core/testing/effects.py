@@ -2,24 +2,25 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from ..arrays import FloatArray
-from ..effect import Effect
+from ..effect import ACTS_ON, Effect
 from ..errors import InputError
 from ..material import Material
 from ..motion import Motion
+from ..obstacles import Table
 from ..parameters import Parameter
 from ..rollout import rollout
 from ..scenario import STANDARD_GRAVITY
-from ..simulator import Simulator
+from ..simulator import Simulator, State
 from .checks import Check, check_leaves_random_state, check_pickles, must, must_raise, raise_failures
 from .reference import ReferenceSimulator
 from .samples import KINDS, sample_material, sample_scenario, sample_scene
 
-ACTS_ON = ("force", "material", "gravity", "command", "observation")
 #: A millionth of the range of every coefficient must not move anything by more than this [m].
 FADED = 1e-4
 
@@ -137,7 +138,7 @@ def check_force(effect: type[Effect], simulator: Simulator, kind: str) -> None:
     for k, velocities in enumerate((at_rest, rng.normal(0, 1, at_rest.shape), rng.normal(0, 10, at_rest.shape))):
         positions = scene.body.vertices + 0.01 * rng.normal(0, 1, at_rest.shape)
         try:
-            got = np.asarray(force(0.01 * k, _frozen(positions), _frozen(velocities)))
+            got = np.asarray(force(0.01 * k, State(_frozen(positions), _frozen(velocities))))
         except ValueError as error:
             must("read-only" not in str(error), "the force writes into the positions or velocities it is given")
             raise
@@ -178,4 +179,7 @@ def _frozen(array: FloatArray) -> FloatArray:
 
 
 def _path(simulator: Simulator, kind: str, *effects: Effect) -> FloatArray:
-    return rollout(simulator, sample_scenario(kind), sample_material(kind), effects).vertices
+    """What is seen of the carried object, whose lowest part touches a table."""
+    scenario = sample_scenario(kind)
+    table = Table(float(scenario.start_vertices()[:, 2].min()) - 0.002)
+    return rollout(simulator, replace(scenario, obstacles=(table,)), sample_material(kind), effects).series.points

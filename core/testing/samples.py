@@ -1,36 +1,48 @@
 """Small objects that the kits try plugins on: a soft sheet and a soft block."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..body import Body, cloth_grid, solid_box
-from ..material import ClothMaterial, Material, SolidMaterial
+from ..body import Body, cloth_grid, rope_line, solid_box
+from ..material import ClothMaterial, Material, RopeMaterial, SolidMaterial
 from ..motion import Motion
+from ..obstacles import Obstacle
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scene import Scene
 
-KINDS = ("cloth", "solid")
+KINDS = ("cloth", "rope", "solid")
 
 
 def sample_body(kind: str) -> Body:
-    """A sheet of 12 x 9 cm or a block of 6 x 6 x 6 cm, tilted so that no axis is special."""
-    body = cloth_grid(0.12, 0.09, 4, 3) if kind == "cloth" else solid_box(np.zeros(3), np.full(3, 0.06), (3, 3, 3))
+    """A sheet of 12 x 9 cm, a line of 15 cm or a block of 6 x 6 x 6 cm, tilted so that no axis is special."""
+    if kind == "cloth":
+        body = cloth_grid(0.12, 0.09, 4, 3)
+    elif kind == "rope":
+        body = rope_line(np.array([[0.0, 0.0, 0.0], [0.09, 0.12, 0.0]]), 6)
+    else:
+        body = solid_box(np.zeros(3), np.full(3, 0.06), (3, 3, 3))
     cos, sin = np.cos(0.3), np.sin(0.3)
     tilt = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
-    return Body(body.kind, body.vertices @ tilt.T + np.array([0.0, 0.0, 1.0]), body.elements, body.grid)
+    return replace(body, vertices=body.vertices @ tilt.T + np.array([0.0, 0.0, 1.0]))
 
 
 def sample_material(kind: str) -> Material:
     """Soft, so that explicit engines stay stable at ordinary steps."""
     if kind == "cloth":
         return ClothMaterial(areal_density=0.2, stretch_stiffness=60.0, bending_rigidity=1e-5)
+    if kind == "rope":
+        return RopeMaterial(linear_density=0.05, stretch_stiffness=20.0, bending_rigidity=2e-5, twist_rigidity=2e-5)
     return SolidMaterial(density=1000.0, youngs_modulus=3e4)
 
 
 def sample_grasp(body: Body) -> IntArray:
-    """The two top corners of the sheet, the lowest face along y of the block."""
+    """The two top corners of the sheet, the first vertex of the line, the lowest face along y of the block."""
     if body.kind == "cloth":
         return np.array([0, 3], np.int64)
+    if body.kind == "rope":
+        return np.array([0], np.int64)
     return np.arange(0, 27).reshape(3, 3, 3)[:, 0].ravel().astype(np.int64)
 
 
@@ -39,27 +51,27 @@ def sample_scene(
     *,
     held: bool = False,
     gravity: FloatArray | None = None,
-    table_height: float | None = None,
+    obstacles: tuple[Obstacle, ...] = (),
     load: float = 0.0,
 ) -> Scene:
     """A scene at rest.
 
     Args:
-        kind: ``"cloth"`` or ``"solid"``.
+        kind: of :data:`KINDS`.
         held: hold :func:`sample_grasp`.
         gravity: ``(3,)`` [m/s2]; default straight down.
-        table_height: [m] or None.
+        obstacles: what stands around it.
         load: mass hung on the last vertex [kg].
     """
     body = sample_body(kind)
     loads = np.zeros(len(body.vertices))
     loads[-1] = load
     down = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if gravity is None else gravity
-    ids = sample_grasp(body) if held else np.zeros(0, np.int64)
-    return Scene(body, sample_material(kind), down, ids, loads, table_height)
+    grasps = (sample_grasp(body),) if held else ()
+    return Scene(body, sample_material(kind), down, grasps, loads, obstacles)
 
 
-def sample_scenario(kind: str, duration: float = 0.3) -> Scenario:
+def sample_scenario(kind: str, duration: float = 0.3, obstacles: tuple[Obstacle, ...] = ()) -> Scenario:
     """The held object carried to and fro for ``duration`` [s], every vertex a marker."""
     body = sample_body(kind)
     clock = np.linspace(0.0, duration, 31)
@@ -73,4 +85,5 @@ def sample_scenario(kind: str, duration: float = 0.3) -> Scenario:
         times=np.linspace(0.0, duration, 16),
         markers=np.eye(len(body.vertices)),
         load_vertices=np.zeros(0, np.int64),
+        obstacles=obstacles,
     )

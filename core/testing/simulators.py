@@ -10,11 +10,12 @@ import numpy as np
 from ..arrays import FloatArray
 from ..effect import Effect, NodalForce
 from ..errors import InputError
+from ..obstacles import Table
 from ..parameters import Parameter
 from ..rollout import rollout
 from ..scenario import STANDARD_GRAVITY
 from ..scene import Scene
-from ..simulator import Simulator, World
+from ..simulator import CAPABILITIES, Simulator, World
 from .checks import Check, check_leaves_random_state, check_pickles, must, must_raise, raise_failures
 from .samples import KINDS, sample_material, sample_scenario, sample_scene
 
@@ -55,6 +56,8 @@ def check_declares(make: MakeSimulator) -> None:
     simulator = make()
     must(isinstance(simulator, Simulator), f"{type(simulator).__name__} is not a muslin.core Simulator")
     must(simulator.name and isinstance(simulator.name, str), "name must be a text")
+    unknown = set(simulator.capabilities) - set(CAPABILITIES)
+    must(not unknown, f"capabilities must be some of {tuple(CAPABILITIES)}, not {sorted(unknown)}")
     wrong = set(simulator.object_kinds) - set(KINDS)
     must(simulator.object_kinds and not wrong, f"object_kinds must be some of {KINDS}, not {simulator.object_kinds}")
     must(simulator.engine_version().strip(), "engine_version() must name the engine and its version")
@@ -153,7 +156,7 @@ def check_table(make: MakeSimulator, kind: str) -> None:
     While it lands it may go deeper, by the way that it falls in two steps: no engine can stop what it
     has not seen touch yet.
     """
-    scene = sample_scene(kind, table_height=0.85)
+    scene = sample_scene(kind, obstacles=(Table(0.85),))
 
     def look(world: World) -> None:
         lowest, fastest = np.inf, 0.0
@@ -224,7 +227,7 @@ class SideForce(Effect):
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         pull = masses[:, None] * np.array([self.values["acceleration"], 0.0, 0.0])
-        return lambda time, positions, velocities: pull
+        return lambda time, state: pull
 
 
 def _with_world(simulator: Simulator, scene: Scene, look: Callable[[World], None]) -> None:

@@ -8,6 +8,7 @@ from ...core.arrays import FloatArray
 from ...core.effect import Effect, NodalForce
 from ...core.parameters import Parameter
 from ...core.scene import Scene
+from ...core.simulator import State
 from .surface import Surface, plate_force
 
 #: Drag coefficient of a flat plate broadside (Hoerner 1965, Fluid-Dynamic Drag, ch. 3).
@@ -23,6 +24,7 @@ class AirDrag(Effect):
 
     name: ClassVar[str] = "air-drag"
     acts_on: ClassVar[str] = "force"
+    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("drag_coefficient", "1", 0.0, 2.5, description="C_D broadside"),
         Parameter("lift_coefficient", "1", 0.0, 1.0, description="C_L"),
@@ -33,9 +35,9 @@ class AirDrag(Effect):
         surface = Surface(scene.body)
         drag, lift = self.values["drag_coefficient"], self.values["lift_coefficient"]
 
-        def force(time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
-            relative = surface.mean(velocities)
-            areas = surface.area_vectors(positions)
+        def force(time: float, state: State) -> FloatArray:
+            relative = surface.mean(state.velocities)
+            areas = surface.area_vectors(state.positions)
             return surface.to_vertices(plate_force(areas, relative, drag, lift, surface.closed))
 
         return force
@@ -51,6 +53,7 @@ class Wind(Effect):
 
     name: ClassVar[str] = "wind"
     acts_on: ClassVar[str] = "force"
+    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("velocity_x", "m/s", -1.5, 1.5, description="air velocity along x"),
         Parameter("velocity_y", "m/s", -1.5, 1.5, description="air velocity along y"),
@@ -61,9 +64,9 @@ class Wind(Effect):
         surface = Surface(scene.body)
         wind = np.array([self.values["velocity_x"], self.values["velocity_y"], 0.0])
 
-        def force(time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
-            velocity = surface.mean(velocities)
-            areas = surface.area_vectors(positions)
+        def force(time: float, state: State) -> FloatArray:
+            velocity = surface.mean(state.velocities)
+            areas = surface.area_vectors(state.positions)
             moving = plate_force(areas, velocity - wind, PLATE_DRAG, 0.0, surface.closed)
             still = plate_force(areas, velocity, PLATE_DRAG, 0.0, surface.closed)
             return surface.to_vertices(moving - still)

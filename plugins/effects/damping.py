@@ -8,6 +8,7 @@ from ...core.effect import Effect, NodalForce
 from ...core.material import Material
 from ...core.parameters import Parameter
 from ...core.scene import Scene
+from ...core.simulator import State
 
 
 class ViscousDamping(Effect):
@@ -26,8 +27,8 @@ class ViscousDamping(Effect):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         factor = -self.values["rate"] * masses[:, None]
 
-        def force(time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
-            return factor * velocities
+        def force(time: float, state: State) -> FloatArray:
+            return factor * state.velocities
 
         return force
 

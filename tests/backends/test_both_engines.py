@@ -11,6 +11,7 @@ from muslin.core.body import cloth_grid, solid_box
 from muslin.core.errors import InputError
 from muslin.core.material import ClothMaterial, SolidMaterial
 from muslin.core.motion import Motion
+from muslin.core.obstacles import Table
 from muslin.core.registry import REGISTRY
 from muslin.core.rollout import COMMAND_STEP, rollout
 from muslin.core.simulator import Simulator
@@ -203,6 +204,6 @@ def test_a_grasp_vertex_that_does_not_exist_is_refused_with_its_number(engine, v
 def test_a_table_carries_vertices_at_its_height(engine):
     """A flat sheet dropped from 1 cm rests with its vertices on the table, to a tenth of a millimetre."""
     body = replace(cloth_grid(0.1, 0.1, 3, 3), vertices=cloth_grid(0.1, 0.1, 3, 3).vertices[:, [0, 2, 1]])
-    drop = scenario(body, turned(0.0), [0.0, 1.0], table_height=0.99)
+    drop = scenario(body, turned(0.0), [0.0, 1.0], obstacles=(Table(0.99),))
     last = rollout(simulator(engine), drop, ClothMaterial(damping_time=0.005)).vertices[-1]
     np.testing.assert_allclose(last[:, 2], 0.99, atol=1e-4)

@@ -25,7 +25,8 @@ AREA, INERTIA, SHEAR = H * H, H**4 / 12, E / 2 / (1 + NU)
 
 
 def scene(body: Body, material: Material, **changes: Any) -> Scene:
-    given = {"gravity": DOWN, "held": NONE_HELD, "loads": np.zeros(len(body.vertices)), **changes}
+    held = changes.pop("held", NONE_HELD)
+    given = {"gravity": DOWN, "grasps": (held,), "loads": np.zeros(len(body.vertices)), **changes}
     return Scene(body, material, **given)
 
 

@@ -18,6 +18,7 @@ from muslin.core.body import Body
 from muslin.core.errors import InputError, RolloutFailed
 from muslin.core.material import ClothMaterial, SolidMaterial
 from muslin.core.motion import Motion
+from muslin.core.obstacles import Table
 from muslin.core.rollout import rollout
 from muslin.core.scenario import Scenario
 
@@ -97,7 +98,9 @@ def test_a_table_carries_a_sheet_and_friction_holds_it():
     flat = Body("cloth", SMALL_CLOTH.vertices[:, [0, 2, 1]] + [0.0, 0.0, 0.002], SMALL_CLOTH.elements)
     slides = []
     for friction in (0.0, 0.5):
-        what = scene(flat, ClothMaterial(friction=friction), gravity=DOWN + np.array([2.0, 0.0, 0.0]), table_height=0.0)
+        what = scene(
+            flat, ClothMaterial(friction=friction), gravity=DOWN + np.array([2.0, 0.0, 0.0]), obstacles=(Table(0.0),)
+        )
         with opened(what) as world:
             moved = run(world, 0.5) - flat.vertices
             slides.append(moved[:, 0].mean())

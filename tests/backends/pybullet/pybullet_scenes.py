@@ -19,7 +19,8 @@ NOWHERE = np.zeros((0, 3))
 
 
 def scene(body: Body, material: Material, **changes: Any) -> Scene:
-    given = {"gravity": GRAVITY, "held": NONE_HELD, "loads": np.zeros(len(body.vertices)), **changes}
+    held = changes.pop("held", NONE_HELD)
+    given = {"gravity": GRAVITY, "grasps": (held,), "loads": np.zeros(len(body.vertices)), **changes}
     return Scene(body, material, **given)
 
 

@@ -10,6 +10,7 @@ from pybullet_scenes import GRAVITY, NONE_HELD, SMALL_CLOTH, WEIGHTLESS, flat, o
 from muslin.backends.pybullet.bending import bending_matrix, is_flat
 from muslin.core.body import Body, cloth_grid
 from muslin.core.material import ClothMaterial
+from muslin.core.obstacles import Table
 
 
 @pytest.mark.parametrize("poisson", [0.1, 0.4])
@@ -96,7 +97,7 @@ def test_table_holds_the_sheet_and_brakes_it(friction):
     body = flat(SMALL_CLOTH, 0.3)
     material = ClothMaterial(friction=friction)
     gravity = np.array([0.3 * 9.80665, 0.0, -9.80665])
-    with opened(scene(body, material, gravity=gravity, table_height=0.3)) as world:
+    with opened(scene(body, material, gravity=gravity, obstacles=(Table(0.3),))) as world:
         moved = run(world, 0.25) - body.vertices
     np.testing.assert_allclose(moved[:, 2], 0.0, atol=1e-4)
     np.testing.assert_allclose(moved[:, 0], 0.5 * 9.80665 * (0.3 - friction) * 0.25**2, rtol=0.03)
@@ -105,7 +106,7 @@ def test_table_holds_the_sheet_and_brakes_it(friction):
 def test_table_friction_holds_below_its_angle():
     body = flat(SMALL_CLOTH, 0.3)
     gravity = np.array([0.3 * 9.80665, 0.0, -9.80665])
-    with opened(scene(body, ClothMaterial(friction=0.5), gravity=gravity, table_height=0.3)) as world:
+    with opened(scene(body, ClothMaterial(friction=0.5), gravity=gravity, obstacles=(Table(0.3),))) as world:
         assert np.abs(run(world, 0.25) - body.vertices).max() < 1e-3
 
 

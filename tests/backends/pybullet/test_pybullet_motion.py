@@ -12,6 +12,7 @@ pytest.importorskip("pybullet")
 from pybullet_scenes import GRAVITY, NOWHERE, SMALL_CLOTH, SMALL_SOLID, WEIGHTLESS, opened, run, scene
 
 from muslin.core.material import ClothMaterial, SolidMaterial
+from muslin.core.obstacles import Table
 
 BODIES = [
     pytest.param(SMALL_CLOTH, ClothMaterial(damping_time=1e-3), id="cloth"),
@@ -94,7 +95,7 @@ def _fingerprint() -> str:
     digest = hashlib.sha256()
     for parameter in BODIES:
         body, material = parameter.values
-        with opened(scene(body, material, held=np.array([0]), table_height=-0.22)) as world:
+        with opened(scene(body, material, held=np.array([0]), obstacles=(Table(-0.22),))) as world:
             digest.update(run(world, 0.15, body.vertices[:1]).tobytes())
     return digest.hexdigest()
 

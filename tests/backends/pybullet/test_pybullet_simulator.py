@@ -18,6 +18,7 @@ from muslin.backends.pybullet import PybulletSimulator, library
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.errors import BrokenPluginError, InputError, RolloutFailed
 from muslin.core.material import ClothMaterial, SolidMaterial
+from muslin.core.obstacles import Table
 
 
 def test_travels_and_names_its_engine():
@@ -68,8 +69,8 @@ def test_missing_engine_is_explained(monkeypatch):
 
 def test_opening_often_leaks_nothing():
     scenes = [
-        scene(cloth_grid(0.1, 0.1, 3, 3), ClothMaterial(), table_height=-1.0),
-        scene(solid_box(np.zeros(3), np.full(3, 0.03), (2, 2, 2)), SolidMaterial(), table_height=-1.0),
+        scene(cloth_grid(0.1, 0.1, 3, 3), ClothMaterial(), obstacles=(Table(-1.0),)),
+        scene(solid_box(np.zeros(3), np.full(3, 0.03), (2, 2, 2)), SolidMaterial(), obstacles=(Table(-1.0),)),
     ]
     memory = []
     files, before = Path("/proc/self/fd"), set(os.listdir(tempfile.gettempdir()))

@@ -10,6 +10,7 @@ from pybullet_scenes import GRAVITY, NOWHERE, WEIGHTLESS, opened, run, scene
 from muslin.backends.pybullet.elements import Elements, volumetric
 from muslin.core.body import Body, solid_box
 from muslin.core.material import SolidMaterial
+from muslin.core.obstacles import Table
 
 E, NU, L, H, RHO = 264e3, 0.3, 0.1, 0.03, 1070.0
 AREA, INERTIA, SHEAR = H * H, H**4 / 12, E / 2 / (1 + NU)
@@ -117,7 +118,7 @@ def test_block_rests_on_the_table_and_slides_only_on_a_steep_one():
     for friction in (0.0, 0.5):
         gravity = np.array([0.3, 0.0, -1.0]) * 9.80665
         material = SolidMaterial(friction=friction, damping_time=1e-3)
-        with opened(scene(body, material, gravity=gravity, table_height=0.1)) as world:
+        with opened(scene(body, material, gravity=gravity, obstacles=(Table(0.1),))) as world:
             moved = run(world, 0.25, NOWHERE) - body.vertices
             slides.append((world.masses @ moved)[0] / world.masses.sum())
         assert np.abs(moved[body.vertices[:, 2] < 0.101, 2]).max() < 1e-3

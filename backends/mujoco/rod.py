@@ -1,0 +1,58 @@
+"""Rope: what MuJoCo's arrays must hold so that a discrete elastic rod is the rope that was asked for.
+
+MuJoCo's rods bend and twist but do not stretch. The stretch is that of a second flex on the same vertices: a
+triangle for every segment, from its two ends to one common fixed point, of which only the edge along the
+segment is elastic. So it has the implicit treatment, the geometric stiffness and the damping of a membrane.
+"""
+
+import numpy as np
+
+from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.body import Body
+from ...core.material import RopeMaterial
+
+#: Stiffnesses of exactly zero make MuJoCo's compiler leave parts out.
+_SMALLEST = 1e-12
+
+
+def stretch_forms(body: Body, material: RopeMaterial) -> FloatArray:
+    """``mjModel.flex_stiffness`` of every triangle ``(E, 21)``, of which the first edge is the segment.
+
+    MuJoCo's energy is M e^2 / 4 with e = L^2 - l^2; the Saint Venant-Kirchhoff rod E A l G^2 / 2 with Green's
+    strain G = e / (2 l^2) asks for M = E A / (2 l^3).
+    """
+    out = np.zeros((len(body.elements), 21))
+    out[:, 0] = material.stretch_stiffness / (2.0 * body.measures**3)
+    return out
+
+
+def hinge_stiffnesses(body: Body, material: RopeMaterial, held: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Bending and torsional stiffness ``(V - 2,)`` [N m] of every inner vertex, between segments of lengths a and b.
+
+    MuJoCo's energies are k |curvature binormal|^2 and k_t twist^2 with k = E I / (a + b) and k_t = G J / (a + b): the
+    stiffness of the rod from one segment's middle to the other's. A segment whose two ends are held is
+    rigid; the rod beside it is clamped at the very vertex, and of the length between both middles only
+    the free half is left: k = E I / b, k_t = G J / b.
+    """
+    lengths = np.where(clamped_segments(body, held), 0.0, body.measures)
+    flexible = lengths[:-1] + lengths[1:]
+    flexible = np.where(flexible > 0, flexible, body.measures[:-1] + body.measures[1:])
+    bend, twist = max(material.bending_rigidity, _SMALLEST), max(material.twist_rigidity, _SMALLEST)
+    return bend / flexible, twist / flexible
+
+
+def clamped_segments(body: Body, held: IntArray) -> BoolArray:
+    """Segments ``(E,)`` of which both ends are held: they do not turn about themselves either."""
+    return np.asarray(np.isin(body.elements, held).all(axis=1))
+
+
+def aside(body: Body) -> FloatArray:
+    """A point ``(3,)`` on the line through no segment: of many directions that with the largest smallest triangle."""
+    middle, size = body.vertices.mean(axis=0), float(np.linalg.norm(np.ptp(body.vertices, axis=0)))
+    turn = np.arange(32) * np.pi * (3.0 - np.sqrt(5.0))  # Fibonacci's sphere
+    z = 1.0 - (2.0 * np.arange(32) + 1.0) / 32
+    sphere = np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)
+    candidates = middle + size * sphere
+    a, b = body.vertices[:-1], body.vertices[1:]
+    areas = np.linalg.norm(np.cross(b - a, candidates[:, None] - a), axis=2).min(axis=1)
+    return np.asarray(candidates[np.argmax(areas)])
