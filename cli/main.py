@@ -9,7 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from ..core.version import __version__
-from . import inspection, recordings, starting, steps
+from . import bench, inspection, recordings, render, simulators, starting, steps
 from .failure import INTERRUPTED, describe, usage_text
 
 app = typer.Typer(
@@ -17,7 +17,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
-    help="Make simulators of cloth and soft solids match reality: fit a simulator to a recording, see where it "
+    help="Make simulators of cloth, ropes and soft solids match reality: fit a simulator to a recording, see where it "
     "fails, learn which physical effect is missing, add it. All units are SI; z is up.",
     epilog="A first study: muslin import, new, fit, compare, diagnose, add, report; every command names the next.",
 )
@@ -42,7 +42,7 @@ def _options(
     """Options of every command."""
 
 
-for _group in (recordings, starting, steps, inspection):
+for _group in (recordings, starting, steps, inspection, render, bench, simulators):
     _group.add_to(app)
 
 

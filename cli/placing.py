@@ -1,12 +1,13 @@
 """Where the measured points sit on the mesh, as far as the first frame tells."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from ..core.body import Body
 from ..core.errors import InputError
 from ..core.measurement import Measurement
-from ..core.scenarios import preset
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
@@ -29,43 +30,44 @@ def parse_markers(text: str) -> str | list[int] | None:
         ) from error
 
 
-def place_markers(plan: Plan, measured: Measurement, where: str) -> tuple[Plan, list[str]]:
+def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body) -> tuple[Plan, list[str]]:
     """The plan with markers that the mesh and the recordings allow, and remarks for the person.
 
     Points that are as many as vertices sit on the vertices; else a solid carries each where it is in
-    the first frame, and on a cloth each sits on the nearest vertex.
+    the first frame, and on cloth and ropes each sits on the nearest vertex.
 
     Args:
         plan: of the study.
         measured: the measurement.
-        where: name of the study file, for messages.
+        study: the study file.
+        body: the object.
     """
     if plan.markers is not None and plan.markers != "nearest":
         return plan, []
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
-    base = preset(plan.scenario)
-    vertices = len(base.body(plan.size, plan.vertices).vertices)
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
-    if plan.markers is None and (not followed or count == vertices):
+    if plan.markers is None and (not followed or count == len(body.vertices)):
         return replace(plan, markers="all"), []
-    if plan.markers is None and base.kind == "solid":
+    if plan.markers is None and body.kind == "solid":
         return replace(plan, markers="bound"), [
             f"the {count} points are tied to the object where they are in the first frame"
         ]
-    return _on_nearest(plan, measured, where, count)
+    return _on_nearest(plan, measured, study, count)
 
 
-def _on_nearest(plan: Plan, measured: Measurement, where: str, count: int) -> tuple[Plan, list[str]]:
+def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> tuple[Plan, list[str]]:
     """Every point on the vertex that is nearest in the first frames, over all recordings."""
-    draft = parse_config(plan_table(replace(plan, markers=[0] * count)), where)
-    problem = build_problem(draft, measured)
-    total, seen = 0.0, 0
+    draft = parse_config(plan_table(replace(plan, markers=[0] * count)), str(study))
+    problem = build_problem(draft, measured, study.parent)
+    total, seen, size = 0.0, 0, 0.0
     for name, recording in problem.recordings.items():
         first = recording.series.points[0]
         if first.shape[1] != 3:
             raise InputError(f"recording {name!r} has points of 2 coordinates; give --markers with vertex numbers")
-        apart = np.linalg.norm(first[:, None] - problem.scenarios[name].world_vertices()[None], axis=2)
+        vertices = problem.scenarios[name].start_vertices()
+        size = max(size, float(np.ptp(vertices, axis=0).max()))
+        apart = np.linalg.norm(first[:, None] - vertices[None], axis=2)
         total, seen = total + np.nan_to_num(apart), seen + np.isfinite(apart)
     if not np.all(seen):
         lost = int(np.argmin(np.all(np.asarray(seen) > 0, axis=1)))
@@ -79,7 +81,7 @@ def _on_nearest(plan: Plan, measured: Measurement, where: str, count: int) -> tu
     remarks = [
         f"the {count} points are placed on their nearest vertices, at most {worst.max():.3g} m away in the first frame"
     ]
-    if worst.max() > _FAR * max(plan.size):
+    if worst.max() > _FAR * size:
         remarks.append(
             f"warning: point {int(worst.argmax())} is {worst.max():.3g} m from the object at the start; check the "
             "scenario, the size, --up and the unit, or give --markers"
@@ -94,7 +96,7 @@ def doubtful_starts(problem: Problem) -> list[str]:
     remarks = []
     for name, recording in problem.recordings.items():
         scenario = problem.scenarios[name]
-        moves = bool(np.ptp(preset(scenario.name).motion().poses, axis=0).any())
+        moves = bool(np.ptp(scenario.motion.poses, axis=0).any())
         if recording.gripper is None and moves and scenario.grasps:
             remarks.append(
                 f"warning: {name} has no gripper poses, so the built-in motion of {scenario.name!r} is taken; import "
@@ -105,7 +107,13 @@ def doubtful_starts(problem: Problem) -> list[str]:
                 f"warning: {name} has {recording.gripper.grippers} grippers, but the object is held by "
                 f"{len(scenario.grasps)}; give every gripper its vertices in [scenario] grasps"
             )
-        vertices = scenario.world_vertices()
+        parts = _parts(scenario.body)
+        if parts > 1:
+            remarks.append(
+                f"warning: the mesh is {parts} parts that do not hang together; sew them (merge vertices by distance), "
+                "or hold each"
+            )
+        vertices = scenario.start_vertices()
         first = recording.series.points[0]
         first = first[np.isfinite(first).all(axis=1)]
         if not len(first) or first.shape[1] != 3:
@@ -117,3 +125,17 @@ def doubtful_starts(problem: Problem) -> list[str]:
                 "unit, the gripper poses, the scenario and the size"
             )
     return list(dict.fromkeys(remarks))
+
+
+def _parts(body: Body) -> int:
+    """How many pieces the mesh is."""
+    piece = np.arange(len(body.vertices))
+    a, b = body.edges.T
+    while True:
+        low = np.minimum(piece[a], piece[b])
+        before = piece.copy()
+        np.minimum.at(piece, a, low)
+        np.minimum.at(piece, b, low)
+        piece = piece[piece]  # as everything that this one has been joined to
+        if np.array_equal(piece, before):
+            return len(np.unique(piece))

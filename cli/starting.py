@@ -4,7 +4,7 @@ import os
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -15,6 +15,7 @@ from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
 from ..core.store import write_text
 from ..core.study import build_problem, parse_config
+from ..core.study.objects import grasps_of, object_of
 from .console import command, next_step, say
 from .output import check_output
 from .placing import doubtful_starts, parse_markers, place_markers
@@ -47,10 +48,25 @@ def new(
         str, typer.Option(metavar="C", help="Recordings kept back, on which every claim is checked; default none.")
     ] = "",
     size: Annotated[
-        str, typer.Option(metavar="W,H", help="Size of the object in m: width, height of a cloth; x, y, z of a solid.")
+        str,
+        typer.Option(
+            metavar="W,H",
+            help="Size of the object in m: width, height of a cloth; length of a rope; x, y, z of a solid.",
+        ),
     ] = "",
     vertices: Annotated[
         str, typer.Option(metavar="N,M", help="Vertices of its mesh along the same axes: more are finer and slower.")
+    ] = "",
+    mesh: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="An object of your own: .obj, .ply or .stl; .vtk or .msh; .csv of a rope."),
+    ] = None,
+    mesh_scale: Annotated[float, typer.Option(metavar="S", help="Of its coordinates: 0.001 for millimetres.")] = 1.0,
+    grasp_points: Annotated[
+        str,
+        typer.Option(
+            metavar="X,Y,Z;X,Y,Z", help="Where each gripper holds the object, in its own frame; default what fits."
+        ),
     ] = "",
     points: Annotated[str, typer.Option(metavar="I,J", help="Measured points to compare, from 0; default all.")] = "",
     markers: Annotated[
@@ -78,29 +94,64 @@ def new(
     fitted = _names(fit_on, measured, "--fit-on") or [n for n in measured.names if n not in held]
     if not fitted:
         raise InputError("--hold-out names every recording, so nothing is left to fit on; leave one out")
+    sizes = _numbers(size, float, "--size")
+    if mesh and sizes:
+        raise InputError("--size does not go with --mesh, which has a size of its own; use --mesh-scale")
+    if not mesh and mesh_scale != 1.0:
+        raise InputError("--mesh-scale goes with --mesh; for a built-in object give --size")
+    table: dict[str, Any] = {"name": scenario}
+    if mesh:
+        table |= {"mesh": _from(study, mesh), "mesh_scale": mesh_scale}
+    else:
+        table |= {"size": sizes or list(base.size), "vertices": list(base.counts(sizes or base.size))}
+    if vertices.strip():
+        table["vertices"] = _numbers(vertices, int, "--vertices")
+    if grasp_points.strip():
+        table["grasp_points"] = _points(grasp_points)
+    whole = {"study": {"measurement": ""}, "scenario": table, "simulator": {"name": simulator}}
+    own = parse_config(whole, str(study)).scenario
+    body = object_of(own, study.parent)
     plan = Plan(
-        measurement=Path(os.path.relpath(measurement.absolute(), study.absolute().parent)).as_posix(),
+        measurement=_from(study, measurement),
         fit_on=fitted,
         hold_out=held,
         scenario=scenario,
         simulator=simulator,
         estimator=estimator,
-        size=_numbers(size, float, "--size") or list(base.size),
-        vertices=_numbers(vertices, int, "--vertices") or list(base.vertices),
+        kind=body.kind,
+        held=[[int(v) for v in g] for g in grasps_of(own, body)],
+        size=own.size or [],
+        vertices=own.vertices or [],
+        mesh=own.mesh,
+        mesh_scale=mesh_scale,
+        grasp_points=table.get("grasp_points"),
         points=_numbers(points, int, "--points") or None,
         markers=parse_markers(markers),
     )
-    plan, remarks = place_markers(plan, measured, str(study))
+    plan, remarks = place_markers(plan, measured, study, body)
     text = study_text(plan)
-    problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured)
+    problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
     remarks += doubtful_starts(problem)
     write_text(study, text)
-    say(f"wrote {study}: fits {base.kind} {scenario!r} on {', '.join(fitted)}")
+    say(f"wrote {study}: fits {body.kind} {scenario!r} on {', '.join(fitted)}")
     if held:
         say(f"  held out: {', '.join(held)}")
     for remark in remarks:
         say(f"  {remark}")
     next_step(command("fit", study), note="look through the study file first")
+
+
+def _from(study: Path, file: Path) -> str:
+    """A path as it is written in the study file, relative to it."""
+    return Path(os.path.relpath(file.absolute(), study.absolute().parent)).as_posix()
+
+
+def _points(text: str) -> list[list[float]]:
+    """``--grasp-points``: x, y, z with commas, semicolons between grippers."""
+    points = [_numbers(part, float, "--grasp-points") for part in text.split(";")]
+    if any(len(p) != 3 for p in points):
+        raise InputError(f"--grasp-points must be x,y,z for every gripper, with ; between them, but is {text!r}")
+    return points
 
 
 def _names(text: str, measured: Measurement, option: str) -> list[str]:

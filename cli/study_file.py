@@ -6,9 +6,12 @@ import tomllib
 from dataclasses import dataclass, fields
 from typing import Any
 
-from ..core.material import DEFAULT_PRIORS, MATERIALS, UNITS
+import numpy as np
+
+from ..core.material import UNITS
+from ..core.obstacles import Obstacle
 from ..core.registry import REGISTRY
-from ..core.scenarios import preset
+from ..core.scenarios import SIZES, Preset, preset
 from ..core.study.config import DiagnoseTable, EstimatorTable
 
 
@@ -20,8 +23,13 @@ class Plan:
         measurement: path of the store, relative to the study file.
         fit_on, hold_out: names of recordings.
         scenario, simulator, estimator: names.
-        size: of the object [m].
-        vertices: counts along the same axes.
+        kind: of the object.
+        held: for every gripper the vertices that it holds.
+        size: of the object [m]; empty for a mesh.
+        vertices: counts along the same axes; of a mesh empty, but for a rope.
+        mesh: file with the object, relative to the study file, or None for a built-in one.
+        mesh_scale: of its coordinates.
+        grasp_points: where each gripper holds it, None for where the scenario says.
         points: measured points to compare, None for all.
         markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
     """
@@ -32,8 +40,13 @@ class Plan:
     scenario: str
     simulator: str
     estimator: str
+    kind: str
+    held: list[list[int]]
     size: list[float]
     vertices: list[int]
+    mesh: str | None
+    mesh_scale: float
+    grasp_points: list[list[float]] | None
     points: list[int] | None
     markers: str | list[int] | None
 
@@ -45,16 +58,16 @@ def plan_table(plan: Plan) -> dict[str, Any]:
 
 def study_text(plan: Plan) -> str:
     """The whole file."""
-    kind = preset(plan.scenario).kind
+    base = preset(plan.scenario)
     parts = [
         "# A study: fit a simulator to a measurement, see where it fails, name what is missing.",
         "# All units are SI (m, kg, s, N, Pa, rad); z is up. Lines that start with # are off.",
         _study(plan),
         _scenario(plan),
         _plugins(plan),
-        _material(kind),
-        _parameters(kind),
-        _effects(),
+        _material(base, plan.kind),
+        _parameters(base, plan.kind),
+        _effects(plan.kind),
         _rest(),
     ]
     return "\n".join(parts)
@@ -70,28 +83,91 @@ seed = 0  # same seed, same machine: same result
 """
 
 
+_ORDER = {
+    "cloth": "row by row from the top edge, x rising",
+    "rope": "from the end that the first gripper holds",
+    "solid": "along x, y, z, z fastest",
+}
+
+
 def _scenario(plan: Plan) -> str:
     base = preset(plan.scenario)
-    body = base.body(plan.size, plan.vertices)
-    cloth = base.kind == "cloth"
-    axes = "width, height" if cloth else "x, y, z"
-    order = "row by row from the top edge, x rising" if cloth else "along x, y, z, z fastest"
-    grasps = [[int(v) for v in g] for g in base.grasps(body)]
     points = f"points = {_value(plan.points)}" if plan.points is not None else "# points = [0, 1, 2]"
-    return f"""
-[scenario]
-name = {_value(plan.scenario)}
-size = {_value(plan.size)}  # {axes} [m]
-vertices = {_value(plan.vertices)}  # mesh vertices along the same axes; numbered {order}
-# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the
-# first frame), or a vertex number for each.
-markers = {_value(plan.markers)}
-{points}  # measured points to compare, from 0; default all
-# grasps = {_value(grasps)}  # for every gripper the vertices that it holds
-settle = {base.settle:g}  # time to come to rest before the first frame [s]
-# What stands around the object, in the world [m]; friction times the material's own is the Coulomb coefficient.
-# obstacles = [{{ kind = "table", height = 0.0, friction = 1.0 }}]
-"""
+    obstacles = (
+        [f"# obstacles = {_inline([_obstacle(o) for o in base.obstacles])}  # built in"] if base.obstacles else []
+    )
+    return "\n".join(
+        [
+            "",
+            "[scenario]",
+            f"name = {_value(plan.scenario)}",
+            *_object(plan),
+            '# The frame of the object: "gripper" (of the first gripper at its first pose), "upright" (from that',
+            '# gripper along the axes of the world) or "world" (as it stands at the start).',
+            '# frame = "gripper"',
+            '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
+            "# first frame), or a vertex number for each.",
+            f"markers = {_value(plan.markers)}",
+            f"{points}  # measured points to compare, from 0; default all",
+            *_grasps(plan),
+            f"settle = {base.settle:g}  # time to come to rest before the first frame [s]",
+            "# What stands around the object, in the world [m]; friction times the material's own is the Coulomb "
+            "coefficient.",
+            *obstacles,
+            '# obstacles = [{ kind = "table", height = 0.0, friction = 1.0 }]',
+            '# obstacles = [{ kind = "cylinder", center = [0, 0, 2], axis = [0, 1, 0], radius = 0.04, length = 0.3 }]',
+            '# obstacles = [{ kind = "mesh", file = "stand.stl", scale = 0.001, up = "z", position = [0, 0, 0] }]',
+            "",
+        ]
+    )
+
+
+def _object(plan: Plan) -> list[str]:
+    if plan.mesh is None:
+        return [
+            f"size = {_value(plan.size)}  # {', '.join(SIZES[plan.kind])} [m]",
+            f"vertices = {_value(plan.vertices)}  # mesh vertices along the same axes; numbered {_ORDER[plan.kind]}",
+            "# An object of your own in place of size: .obj, .ply, .stl (cloth), .vtk, .msh (solid), .csv (rope).",
+            '# mesh = "shirt.obj"  # relative to this file',
+            "# mesh_scale = 0.001  # 0.001 if it is in millimetres",
+        ]
+    lines = [
+        f"mesh = {_value(plan.mesh)}  # relative to this file",
+        f"mesh_scale = {_value(plan.mesh_scale)}  # 0.001 if it is in millimetres",
+        '# mesh_up = "y"  # the axis of the file that points up; default z',
+    ]
+    if plan.kind == "rope":
+        count = _value(plan.vertices) if plan.vertices else "[41]"
+        lines += [
+            f"{'' if plan.vertices else '# '}vertices = {count}  # of the rope; default the points of the file",
+            "# straight_rest = true  # the file is the shape at the start, the rope is straight where nothing acts",
+        ]
+    return lines
+
+
+def _grasps(plan: Plan) -> list[str]:
+    points = plan.grasp_points
+    shown = _value(points) if points is not None else "[[0.0, 0.0, 0.0]]"
+    return [
+        f"# grasps = {_value(plan.held)}  # for every gripper the vertices that it holds",
+        "# or a point (or a list of points) for every gripper in the frame of the object [m], which holds the vertex",
+        "# nearest to it and all within grasp_radius:",
+        f"{'# ' if points is None else ''}grasp_points = {shown}",
+        "# grasp_radius = 0.01",
+    ]
+
+
+def _obstacle(obstacle: Obstacle) -> dict[str, Any]:
+    """A built-in obstacle as it is written in a study."""
+    shape: dict[str, Any] = {"kind": type(obstacle).__name__.lower()}
+    for field in fields(obstacle):
+        value = getattr(obstacle, field.name)
+        shape[field.name] = value.tolist() if isinstance(value, np.ndarray) else value
+    return shape
+
+
+def _inline(tables: list[dict[str, Any]]) -> str:
+    return f"[{', '.join('{ ' + ', '.join(f'{k} = {_value(v)}' for k, v in t.items()) + ' }' for t in tables)}]"
 
 
 def _plugins(plan: Plan) -> str:
@@ -118,20 +194,21 @@ def _options(kind: str, name: str) -> list[str]:
     return [f"{key} = {_value(value)}" for key, value in defaults if isinstance(value, bool | int | float | str)]
 
 
-def _material(kind: str) -> str:
-    inferred = {p.name for p in DEFAULT_PRIORS[kind]}
+def _material(base: Preset, kind: str) -> str:
+    inferred = {p.name for p in base.default_priors(kind)}
+    material = base.default_material(kind)
     lines = ["", "# What is known of the material; put in what you have weighed or looked up.", "[material]"]
-    for field in fields(MATERIALS[kind]):
+    for field in fields(material):
         if field.name in inferred:
             lines.append(f"# {field.name} is inferred, see below")
         else:
-            lines.append(f"{field.name} = {_value(field.default)}  # [{UNITS[kind][field.name]}]")
+            lines.append(f"{field.name} = {_value(getattr(material, field.name))}  # [{UNITS[kind][field.name]}]")
     return "\n".join([*lines, ""])
 
 
-def _parameters(kind: str) -> str:
+def _parameters(base: Preset, kind: str) -> str:
     lines = ["", "# What is inferred, with the bounds of its prior. Add any field of [material], or scale (the size)."]
-    for p in DEFAULT_PRIORS[kind]:
+    for p in base.default_priors(kind):
         lines += [
             f"[parameters.{p.name}]  # {p.description}",
             f"low = {_value(p.low)}",
@@ -144,11 +221,12 @@ def _parameters(kind: str) -> str:
     return "\n".join([*lines, ""])
 
 
-def _effects() -> str:
-    return """
+def _effects(kind: str) -> str:
+    air = "cylinder-drag" if kind == "rope" else "air-drag"
+    return f"""
 # Physics on top of the plain model; muslin plugins lists the effects, muslin add writes these tables.
 # An empty table infers every coefficient in its own range; a number fixes one.
-# [effects.air-drag]
+# [effects.{air}]
 # drag_coefficient = 1.2
 """
 

@@ -44,6 +44,8 @@ class Effect(ABC):
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
     #: What a simulator must be able to do for it, of :data:`muslin.core.simulator.CAPABILITIES`.
     needs: ClassVar[frozenset[str]] = frozenset()
+    #: Whether it only ever takes energy away from the object.
+    dissipative: ClassVar[bool] = False
     #: One clause that completes "the object ...": what one sees when the effect is missing from a model.
     symptom: ClassVar[str] = "moves differently"
 

@@ -121,6 +121,11 @@ class StaticMesh:
         """How deep a point can be inside [m], at most: the radius of a ball of the same volume."""
         return float(np.cbrt(3.0 * self.volume / (4.0 * np.pi)))
 
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Low and high corner ``(3,)`` of the box around it [m]."""
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
+
     @property
     def volume(self) -> float:
         """[m3], positive if the triangles look outward."""

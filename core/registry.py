@@ -23,6 +23,7 @@ GROUPS = {
     "estimator": "muslin.estimators",
     "effect": "muslin.effects",
     "step": "muslin.steps",
+    "renderer": "muslin.renderers",
 }
 
 
@@ -147,6 +148,9 @@ _EXTRAS = {
     "jinja2": "report",
     "ezc3d": "mocap",
     "xarray": "xarray",
+    "trimesh": "mesh",
+    "meshio": "mesh",
+    "cv2": "perception",
 }
 
 

@@ -1,19 +1,24 @@
 """Scenarios: an object, how it is held, what is around it and where its markers sit."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .body import Body
 from .errors import InputError
-from .material import Material
+from .material import Material, RopeMaterial
 from .measurement import Recording
 from .motion import Motion, inverse, rotate
 from .obstacles import Obstacle
 from .scene import Scene
 
 STANDARD_GRAVITY = 9.80665
+#: ``(body [world, to scale], poses of the grippers (G, 7), obstacles, clearance [m]) -> start (V, 3) [m], world``.
+#: ``clearance`` is how far from an obstacle's surface a vertex stays. A function of a module, so that it pickles.
+StartShape: TypeAlias = Callable[[Body, FloatArray, tuple[Obstacle, ...], float], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +35,8 @@ class Scenario:
         load_vertices: where a recording's load hangs, shared equally.
         load: [kg].
         obstacles: what stands around it, in the world.
-        start: where the vertices are before they settle ``(V, 3)`` [m], in the frame of the body; None: in the
-            rest shape.
+        start: makes the shape that the object is in before it settles, from the poses that the grippers really
+            have then; None: it is in its rest shape. The held vertices sit in their grippers as they start.
         settle: time that the object is given to come to rest before the first observation [s].
     """
 
@@ -44,7 +49,7 @@ class Scenario:
     load_vertices: IntArray
     load: float = 0.0
     obstacles: tuple[Obstacle, ...] = ()
-    start: FloatArray | None = None
+    start: StartShape | None = None
     settle: float = 0.0
 
     def __post_init__(self) -> None:
@@ -81,22 +86,29 @@ class Scenario:
     def world_vertices(self, scale: float = 1.0) -> FloatArray:
         """Rest vertices ``(V, 3)`` [m] as held at the start; ``scale`` stretches about the first grasp."""
         about = self.body.vertices[self.grasps[0]].mean(axis=0) if self.grasps else self.body.vertices.mean(axis=0)
-        return self._in_world(self.body.scaled(scale, about).vertices)
-
-    def start_vertices(self, scale: float = 1.0) -> FloatArray:
-        """Where the vertices are before they settle ``(V, 3)`` [m]; a start of its own does not scale."""
-        return self.world_vertices(scale) if self.start is None else self._in_world(self.start)
-
-    def _in_world(self, points: FloatArray) -> FloatArray:
         pose = self.motion.at(self.times[:1])[0, 0]
-        return np.asarray(rotate(pose[3:], points) + pose[:3])
+        return np.asarray(rotate(pose[3:], self.body.scaled(scale, about).vertices) + pose[:3])
+
+    def start_vertices(self, scale: float = 1.0, clearance: float = 0.0) -> FloatArray:
+        """Where the vertices are before they settle ``(V, 3)`` [m].
+
+        Args:
+            scale: of the object's size [1].
+            clearance: how far from an obstacle's surface a vertex stays [m].
+        """
+        rest = self.world_vertices(scale)
+        if self.start is None:
+            return rest
+        body = replace(self.body, vertices=rest)
+        return self.start(body, self.motion.at(self.times[:1])[0], self.obstacles, clearance)
 
     def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
         body = replace(self.body, vertices=self.world_vertices(scale))
         loads = np.zeros(len(body.vertices))
         if self.load > 0:
             loads[self.load_vertices] = self.load / len(self.load_vertices)
-        start = None if self.start is None else self.start_vertices(scale)
+        clearance = material.diameter / 2 if isinstance(material, RopeMaterial) else 0.0
+        start = None if self.start is None else self.start_vertices(scale, clearance)
         return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start)
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:

@@ -23,8 +23,10 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, record
     nudged = {name: value * (1 + NUDGE) for name, value in values.items()}
     plain, moved = pool.map([Task(values, recording), Task(nudged, recording)])
     out: list[str] = []
-    if not (isinstance(plain, Trajectory) and isinstance(moved, Trajectory)):
-        return out
+    for what, outcome in (("the best fit", plain), ("the best fit, moved by one part in 10^9,", moved)):
+        if not isinstance(outcome, Trajectory):
+            return [f"{what} cannot be simulated: {outcome.reason}"]
+    assert isinstance(plain, Trajectory) and isinstance(moved, Trajectory)
     shift = float(np.sqrt(np.mean((plain.series.points - moved.series.points) ** 2)))
     if shift > 0.3 * noise.sd:
         out.append(

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 import zarr
 
-from ..core.arrays import FloatArray, IntArray
+from ..core.arrays import BoolArray, FloatArray, IntArray
 from ..core.errors import StoreError
 from ..core.rollout import Trajectory
 from ..core.store import damage_errors, empty_draws, put, storage_errors
@@ -86,6 +86,13 @@ class DrawStore:
     def failures(self) -> list[str]:
         """Reasons of the draws that failed."""
         return list(self._failures().values())
+
+    def tried(self) -> tuple[FloatArray, BoolArray]:
+        """Unit parameters ``(N, D)`` of all draws that were simulated, and which of them failed ``(N,)``."""
+        there = self.status != ABSENT
+        with damage_errors(self._path):
+            theta = np.asarray(self._draws["theta"][...])[there]
+        return theta, self.status[there] == FAILED
 
     def read(self, upto: int) -> tuple[FloatArray, list[FloatArray], IntArray]:
         """Whole draws among the first ``upto``: unit parameters, points a recording, and their numbers."""

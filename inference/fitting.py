@@ -1,9 +1,7 @@
 """The step ``fit``: sequential simulation-based inference, then a least-squares polish."""
 
-import re
 import tempfile
 import time
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +19,8 @@ from ..core.series import PointSeries
 from ..core.store import damage_errors, put, read, storage_errors
 from ..core.study import Study, Task
 from .doubts import doubts
-from .draws import ABSENT, DrawStore
+from .draws import ABSENT, FAILED, WHOLE, DrawStore
+from .failures import failure_notes, reasons_text, region_text
 from .noise import Noise, estimate_noise
 from .observe import Observer
 from .only_one import only_one
@@ -29,6 +28,8 @@ from .polish import Objective, polish
 from .proposals import log_weights, propose
 from .residuals import Offsets, residual
 
+#: So many draws of the first round, and not one of them whole, end a fit at once.
+HOPELESS = 20
 #: Posterior mass within 2 % of a bound above which the prior box looks too small.
 AT_BOUND = 0.3
 SAMPLES = 2000
@@ -121,10 +122,12 @@ def _fit(study: Study, noise: Noise) -> FitResult:
             outcomes = pool.map(tasks)
             for done, i in enumerate(missing):
                 store.write(first + i, proposal[i], {r: next(outcomes) for r in problem.fit_on})
+                if not (store.status == WHOLE).any() and (store.status == FAILED).sum() >= HOPELESS:
+                    raise MuslinError(_too_many_failed(store, problem.space))
                 study.progress(f"round {k + 1} of {rounds}: simulating", per_round - len(missing) + done + 1, per_round)
             theta, points, numbers = store.read(first + per_round)
             if len(theta) < max(10, 0.1 * (first + per_round)):
-                raise MuslinError(_too_many_failed(store, first + per_round))
+                raise MuslinError(_too_many_failed(store, problem.space))
             study.progress(f"round {k + 1} of {rounds}: training {config.estimator.name}", 0, 0)
             density.append(_train(study, observer, theta, points, numbers, density, k))
         study.progress("polishing the best draw by least squares", 0, 0)
@@ -135,6 +138,7 @@ def _fit(study: Study, noise: Noise) -> FitResult:
         warnings = doubts(pool, units, best.unit, problem.fit_on[0], noise)
         simulations = rounds * per_round * len(problem.fit_on) + pool.count - before
     samples = density[-1].sample(SAMPLES, np.random.default_rng([config.study.seed, rounds]))
+    warnings = [*failure_notes(units, *store.tried(), store.failures(), samples), *warnings]
     estimate = units.from_unit(best.unit)
     # what the model leaves unexplained makes the estimate that much less certain
     sd = physical_sd(units, best.unit, best.covariance) * np.sqrt(max(1.0, best.rss / best.count))
@@ -242,12 +246,13 @@ def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:
     return np.asarray(theta[int(np.argmin(total))])
 
 
-def _too_many_failed(store: DrawStore, count: int) -> str:
-    reasons = Counter(re.sub(r"[-+]?\d[\d.e+-]*", "#", r) for r in store.failures()).most_common(3)
+def _too_many_failed(store: DrawStore, space: ParameterSpace) -> str:
+    theta, failed = store.tried()
+    where = region_text(space, theta, failed)
     return (
-        f"{len(store.failures())} of {count} draws failed: "
-        + "; ".join(f"{n} times {reason!r}" for reason, n in reasons)
-        + ". Narrow the priors in [parameters] or lower [simulator] time_step, then fit again"
+        f"{int(failed.sum())} of {len(failed)} draws could not be simulated: {reasons_text(store.failures())}"
+        + (f"; {where}" if where else "")
+        + ". Narrow the priors in [parameters], lower [simulator] time_step or raise [study] time_limit, then fit again"
     )
 
 

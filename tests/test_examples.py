@@ -57,3 +57,23 @@ def test_the_beam_is_imported_and_its_study_resolves(tmp_path: Path) -> None:
         start = scenario.markers @ scenario.world_vertices()
         np.testing.assert_allclose(start, recording.series.points[0], atol=1e-6)
         assert np.ptp(recording.series.points[:, :, 2], axis=0).min() > 0.005  # it was let go
+
+
+@pytest.mark.parametrize("engine", ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow)])
+def test_the_shirt_is_what_its_script_makes_and_swings(
+    engine: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip(engine)
+    pytest.importorskip("trimesh")
+    folder = EXAMPLES / "own_mesh"
+    for name in ("shirt.obj", "study.toml"):
+        shutil.copy(folder / name, tmp_path)
+    module(folder / "make_shirt.py").main(tmp_path / "again.obj")
+    assert (tmp_path / "again.obj").read_text() == (folder / "shirt.obj").read_text()
+    module(folder / "swing.py").main(engine, str(tmp_path / "recording.zarr"))
+    assert f"{engine}: 145 vertices" in capsys.readouterr().out
+    study = Study.load(tmp_path / "study.toml")
+    scenario = study.problem.scenarios["swing"]
+    assert len(scenario.grasps) == 1 and len(scenario.grasps[0]) == 6  # the seams of both shoulders
+    np.testing.assert_allclose(study.measurement["swing"].series.points[0, scenario.grasps[0], 2], 1.0, atol=1e-6)
+    study.problem.simulator.check(scenario.scene(study.problem.material, np.array([0.0, 0.0, -9.8])))

@@ -24,12 +24,13 @@ def geoms(obstacles: tuple[Obstacle, ...], friction: float, inflation: float, to
     assets, bodies = [], []
     for number, obstacle in enumerate(obstacles):
         # of two geoms in contact the one with the higher priority decides on friction and stiffness
-        common = f'priority="1" condim="3" friction="{max(friction * obstacle.friction, 1e-5):.17g} 0 0" {touch}'
+        coefficient = max(friction * obstacle.friction, 1e-5)
+        common = f'priority="1" condim="3" contype="1" conaffinity="2" friction="{coefficient:.17g} 0 0" {touch}'
         if isinstance(obstacle, Table):
             height = obstacle.height - inflation
             bodies.append(f'<geom type="plane" size="{_PLANE} {_PLANE} 0.1" pos="0 0 {height:.17g}" {common}/>')
         elif isinstance(obstacle, Cylinder):
-            radius, half = (max(s - inflation, 0.5 * s) for s in (obstacle.radius, obstacle.length / 2))
+            radius, half = obstacle.radius - inflation, obstacle.length / 2 - inflation
             a, b = obstacle.center - half * obstacle.direction, obstacle.center + half * obstacle.direction
             bodies.append(f'<geom type="cylinder" size="{radius:.17g}" fromto="{_numbers(a)} {_numbers(b)}" {common}/>')
         else:

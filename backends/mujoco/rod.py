@@ -5,6 +5,8 @@ triangle for every segment, from its two ends to one common fixed point, of whic
 segment is elastic. So it has the implicit treatment, the geometric stiffness and the damping of a membrane.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
@@ -56,3 +58,37 @@ def aside(body: Body) -> FloatArray:
     a, b = body.vertices[:-1], body.vertices[1:]
     areas = np.linalg.norm(np.cross(b - a, candidates[:, None] - a), axis=2).min(axis=1)
     return np.asarray(candidates[np.argmax(areas)])
+
+
+def start_twist(body: Body, start: FloatArray) -> float:
+    """Angle [rad] by which all segments of a curved rope are turned about themselves at ``start (V, 3)``.
+
+    MuJoCo starts with material frames that go from the first segment's rest direction to its present one by the
+    shortest turn, and on from there without twist. A rope moved rigidly is at rest only if its frames turn
+    along; of all common turns this is the one that leaves the least bending energy.
+    """
+    axis = np.eye(3)[np.argmin(np.abs(body.vertices[1] - body.vertices[0]))]
+    rest, now = np.diff(body.vertices, axis=0), np.diff(start, axis=0)
+    rest, now = (d / np.linalg.norm(d, axis=1, keepdims=True) for d in (rest, now))
+    u = np.cross(rest[0], axis)
+    u /= np.linalg.norm(u)
+    at_rest = _curvatures(rest, u)
+    present = _curvatures(now, _carried(u, rest[0], now[0]))
+    cross = np.sum(at_rest[:, 0] * present[:, 1] - at_rest[:, 1] * present[:, 0])
+    return float(np.arctan2(cross, np.sum(at_rest * present))) if np.abs(at_rest).max(initial=0.0) > 1e-4 else 0.0
+
+
+def _curvatures(tangents: FloatArray, u: FloatArray) -> FloatArray:
+    """Curvature binormals ``(V - 2, 2)`` in a frame that goes along without twist from ``u (3,)``."""
+    out = np.empty((len(tangents) - 1, 2))
+    for k, (a, b) in enumerate(pairwise(tangents)):
+        binormal = 2.0 * np.cross(a, b) / (1.0 + a @ b)
+        out[k] = binormal @ u, binormal @ np.cross(a, u)
+        u = _carried(u, a, b)
+    return out
+
+
+def _carried(u: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """``u`` after the shortest turn from direction ``a`` to ``b``."""
+    binormal, cosine = np.cross(a, b), a @ b
+    return np.asarray(u * cosine + np.cross(binormal, u) + binormal * (binormal @ u) / (1.0 + cosine))

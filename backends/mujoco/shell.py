@@ -1,10 +1,8 @@
 """Cloth: what MuJoCo's arrays must hold so that a flex is the sheet that was asked for."""
 
-from typing import Any
-
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
 from ...core.material import ClothMaterial
 
@@ -38,18 +36,20 @@ def stretch_forms(body: Body, material: ClothMaterial) -> FloatArray:
     return out
 
 
-def hinge_thickness(material: ClothMaterial) -> float:
-    """Thickness t [m] at which MuJoCo's own shell of modulus E = (E t) / t has bending rigidity D.
+def fold_weights(corners: IntArray, hinges: IntArray, weights: FloatArray) -> FloatArray:
+    """Sum of the ``weights (N,)`` of ``hinges (N, 4)`` for each hinge ``corners (M, 4)`` of the same edges, edge first.
 
-    From D = E t^3 / (12 (1 - nu^2)), the Kirchhoff plate: t = sqrt(12 (1 - nu^2) D / (E t)).
+    What they weigh is a determinant, which changes sign when the ends of the edge or the two corners beside it swap.
     """
-    nu = material.poisson_ratio
-    return float(np.sqrt(12.0 * (1.0 - nu**2) * material.bending_rigidity / material.stretch_stiffness))
+    size = int(hinges.max(initial=0)) + 1
+    keys, where = np.unique(_edge_keys(hinges, size), return_inverse=True)
+    totals = np.bincount(where.ravel(), weights * _parity(hinges), minlength=len(keys))
+    return np.asarray(totals[np.searchsorted(keys, _edge_keys(corners, size))] * _parity(corners))
 
 
-def write_stretch(view: Any, forms: FloatArray, factor: FloatArray | None) -> None:
-    """Fill MuJoCo's array, each element's form times its ``factor (E,)``."""
-    if factor is None:
-        view[:] = forms
-    else:
-        np.multiply(forms, factor[:, None], out=view)
+def _edge_keys(hinges: IntArray, size: int) -> IntArray:
+    return np.asarray(hinges[:, :2].min(axis=1) * size + hinges[:, :2].max(axis=1))
+
+
+def _parity(hinges: IntArray) -> FloatArray:
+    return np.where((hinges[:, 0] < hinges[:, 1]) == (hinges[:, 2] < hinges[:, 3]), 1.0, -1.0)

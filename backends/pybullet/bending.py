@@ -1,108 +1,214 @@
-"""Bending of a sheet that is flat at rest: a constant matrix, force = -D Q x."""
+"""Bending of sheets: a constant matrix for one that is flat at rest, hinges for any other."""
 
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
 from ...core.body import Body
+from ...core.plate import bending_matrix
+from .sparse import Operator, from_dense, operator
 
 #: Share of the energy taken triangle by triangle instead of averaged over the triangles around a vertex.
 _UNAVERAGED = 0.1
 
 
-def bending_matrix(body: Body, held: IntArray) -> FloatArray:
-    r"""The matrix ``Q (V, V)`` [1/m2] with bending energy :math:`D/2 \sum_{axis} x^T Q x`.
-
-    Each triangle has a shape operator made of its three hinges: :math:`S = \sum_i k_i t_i t_i^T / 2A`,
-    where :math:`t_i` is normal to edge i in the plane and :math:`k_i` is, in the linear hinge of Wardetzky et
-    al., edge length times bending angle (as a vector). At a free edge the curvature across it costs nothing.
-    One regular grid in this form alone is 1.5 times too stiff along diagonals and 2 times in twist, since the
-    hinges alias; averaging S over the triangles of a vertex takes that away, and a small unaveraged share keeps
-    the shortest wrinkles stiff. The energy density is :math:`D/2 (k_1^2 + k_2^2)`: a sheet bent to a
-    cylinder of curvature k stores :math:`D k^2 / 2` per area in any direction, wide strip or narrow.
-
-    Triangles of which all corners are held are rigid. The sheet beside them is clamped at the very edge: a hinge
-    there turns one triangle only, by its whole angle instead of half, and all its energy is in that triangle.
-    Without this a cantilever would be clamped half a cell too deep, which on 8 cells is 20 % of sag.
+class FlatBending:
+    """Of a sheet that is flat at rest: force = -D Q x with the matrix of :func:`~muslin.core.plate.bending_matrix`.
 
     Args:
-        body: flat at rest; Q measures curvature, not change of curvature.
+        body: flat mesh.
+        rigidity: D [N m].
+        weft_ratio: D along the weft over that along the warp [1].
+        held: indices ``(H,)`` of the held vertices.
+    """
+
+    def __init__(self, body: Body, rigidity: float, weft_ratio: float, held: IntArray) -> None:
+        matrix = rigidity * bending_matrix(body, held, weft_ratio)
+        self.diagonal: FloatArray = np.diag(matrix).copy()
+        self._minus: Operator = from_dense(-matrix)
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Nodal forces ``(V, 3)`` [N]."""
+        return self._minus(positions)
+
+    def stiffness(self, motion: FloatArray) -> FloatArray:
+        """Stiffness times ``motion (V, 3)``."""
+        return -self._minus(motion)
+
+
+class CurvedBending:
+    r"""Of a sheet of any rest shape, by the angles of its hinges.
+
+    The energy of :func:`~muslin.core.plate.bending_matrix` with the change :math:`\theta - \theta_0` of every
+    hinge's angle times its length in place of the linear bend of a flat sheet; on a flat one both agree for
+    small angles. Where the curvature of the triangles around a vertex is averaged, each is first turned
+    into the vertex's tangent plane.
+
+    Args:
+        body: mesh in its rest shape.
+        rigidity: D [N m].
+        weft_ratio: D along the weft over that along the warp [1].
         held: indices ``(H,)`` of the held vertices.
 
     References:
-        Grinspun, Gingold, Reisman and Zorin, *Computing discrete shape operators on general meshes*, 2006;
-        Wardetzky, Bergou, Harmon, Zorin and Grinspun, *Discrete quadratic curvature energies*, 2007.
+        Grinspun, Hirani, Desbrun and Schroeder, *Discrete shells*, 2003, for the angles as measure of bending.
     """
-    rigid: BoolArray = np.all(np.isin(body.elements, held), axis=1)
-    shape = _shape_operators(body, rigid)
-    area = np.where(rigid, 0.0, body.measures)
-    share = np.zeros((len(body.vertices), len(area)))
-    for corner in range(3):
-        share[body.elements[:, corner], np.arange(len(area))] = area / 3.0
-    around = share.sum(axis=1)
-    weight = np.divide(1.0, around, out=np.zeros_like(around), where=around > 0)
-    averaged = np.sqrt((1 - _UNAVERAGED) * weight)[:, None] * share
-    matrix = np.zeros((len(body.vertices),) * 2)
-    for part in shape:
-        smooth, rough = averaged @ part, np.sqrt(_UNAVERAGED * area)[:, None] * part
-        matrix += smooth.T @ smooth + rough.T @ rough
-    return matrix
+
+    def __init__(self, body: Body, rigidity: float, weft_ratio: float, held: IntArray) -> None:
+        self._hinges, sides = _hinges(body)
+        hinges, count = self._hinges, len(self._hinges)
+        form = rigidity * _hinge_form(body, hinges, sides, weft_ratio, held)
+        self._rest = np.zeros(count)
+        self._rest = self._angles(body.vertices)
+        rows = np.broadcast_to(np.arange(4 * count).reshape(4, count), (4, count))
+        self._back: Operator = operator(hinges.T, rows, np.ones((4, count)), (len(body.vertices), 4 * count))
+        self._form = form
+        matrix = np.einsum("ahx,h,bhx->abh", self._slopes, np.abs(form).sum(axis=1), self._slopes)
+        own = np.einsum("aah->ha", matrix)
+        own_sum = np.bincount(hinges.ravel(), own.ravel(), minlength=len(body.vertices))
+        self.diagonal: FloatArray = np.asarray(own_sum, np.float64)
+
+    def _angles(self, positions: FloatArray) -> FloatArray:
+        """Changes of angle ``(N,)``; the slopes of the angles are kept."""
+        a, b, c, d = (positions[self._hinges[:, k]] for k in range(4))
+        edge = b - a
+        size = np.sqrt(np.einsum("ij,ij->i", edge, edge))
+        along = edge / size[:, None]
+        first, second = np.cross(edge, c - a), np.cross(d - a, edge)
+        one, two = np.einsum("ij,ij->i", first, first), np.einsum("ij,ij->i", second, second)
+        np.maximum(one, 1e-9 * size**4, out=one)  # a collapsed triangle has no normal
+        np.maximum(two, 1e-9 * size**4, out=two)
+        sine = np.einsum("ij,ij->i", np.cross(second, first), along)
+        angles = np.arctan2(sine, np.einsum("ij,ij->i", first, second))
+        n1, n2 = first / one[:, None], second / two[:, None]
+        pc, pd = size[:, None] * n1, size[:, None] * n2
+        tc = np.einsum("ij,ij->i", c - a, along)[:, None]
+        td = np.einsum("ij,ij->i", d - a, along)[:, None]
+        towards_b = tc * n1 + td * n2
+        self._slopes = np.stack([towards_b - pc - pd, -towards_b, pc, pd])
+        change = angles - self._rest
+        return np.asarray(change - 2.0 * np.pi * np.round(change / (2.0 * np.pi)))
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Nodal forces ``(V, 3)`` [N]."""
+        moment = self._form @ self._angles(positions)
+        return self._back((-moment[:, None] * self._slopes).reshape(-1, 3))
+
+    def stiffness(self, motion: FloatArray) -> FloatArray:
+        """Stiffness times ``motion (V, 3)``."""
+        rate = np.einsum("ahx,ahx->h", self._slopes, motion[self._hinges.T])
+        return self._back(((self._form @ rate)[:, None] * self._slopes).reshape(-1, 3))
 
 
-def is_flat(body: Body) -> bool:
-    """Whether all vertices lie in one plane, to a millionth of the size."""
-    centred = body.vertices - body.vertices.mean(axis=0)
-    extents = np.linalg.svd(centred, compute_uv=False)
-    return bool(extents[2] <= 1e-6 * extents[0])
+def _hinges(body: Body) -> tuple[IntArray, IntArray]:
+    """Inner edges with the corner left and the corner right of them ``(N, 4)``, and those triangles ``(N, 2)``.
 
-
-def _shape_operators(body: Body, rigid: BoolArray) -> FloatArray:
-    """Rows ``(3, E, V)`` [1/m2] that give xx, zz and sqrt(2) xz of each triangle's curvature from positions."""
-    hinges, stencils, sides = _hinges(body)
-    stencils = stencils * np.where(rigid[sides].any(axis=1), 2.0, 1.0)[:, None]
-    row = {tuple(sorted(h[:2])): k for k, h in enumerate(hinges.tolist())}
-    points, along, across = body.vertices, *_plane(body)
-    out = np.zeros((3, len(body.elements), len(body.vertices)))
-    for e, (triangle, area) in enumerate(zip(body.elements.tolist(), body.measures, strict=True)):
-        free = []
-        for i in range(3):
-            a, b = triangle[i], triangle[(i + 1) % 3]
-            edge = points[b] - points[a]
-            tx, ty = -(edge @ across), edge @ along
-            normal = np.array([tx * tx, ty * ty, np.sqrt(2.0) * tx * ty]) / (edge @ edge)
-            k = row.get((min(a, b), max(a, b)))
-            if k is None:
-                free.append(normal)
-            else:
-                out[:, e, hinges[k]] += np.outer(normal, stencils[k] / (2.0 * area))
-        if free:
-            basis = np.linalg.qr(np.array(free).T)[0]
-            out[:, e] -= basis @ (basis.T @ out[:, e])
-    return out
-
-
-def _plane(body: Body) -> tuple[FloatArray, FloatArray]:
-    """Two orthonormal vectors ``(3,)`` in the plane of the sheet."""
-    a, b, c = body.vertices[body.elements[0]]
-    along = (b - a) / np.linalg.norm(b - a)
-    across = (c - a) - ((c - a) @ along) * along
-    return along, across / np.linalg.norm(across)
-
-
-def _hinges(body: Body) -> tuple[IntArray, FloatArray, IntArray]:
-    """Interior edges with their two opposite vertices ``(N, 4)``, stencils ``(N, 4)`` [1], triangles ``(N, 2)``."""
-    beside: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    Seen from where the first triangle runs counterclockwise; the other may run either way.
+    """
+    first: dict[tuple[int, int], tuple[int, int, int, int]] = {}
+    hinges, sides = [], []
     for e, triangle in enumerate(body.elements.tolist()):
         for i in range(3):
             a, b, c = triangle[i], triangle[(i + 1) % 3], triangle[(i + 2) % 3]
-            beside.setdefault((min(a, b), max(a, b)), []).append((c, e))
-    inside = [(edge, pair) for edge, pair in beside.items() if len(pair) == 2]
-    hinges = np.array([[*edge, p[0], q[0]] for edge, (p, q) in inside], dtype=np.int64).reshape(-1, 4)
-    sides = np.array([[p[1], q[1]] for _, (p, q) in inside], dtype=np.int64).reshape(-1, 2)
-    a, b, c, d = (body.vertices[hinges[:, i]] for i in range(4))
-    ac, ad = _cotangent(b - a, c - a), _cotangent(b - a, d - a)
-    bc, bd = _cotangent(a - b, c - b), _cotangent(a - b, d - b)
-    return hinges, np.stack([bc + bd, ac + ad, -ac - bc, -ad - bd], axis=1), sides
+            key = (min(a, b), max(a, b))
+            if key in first:
+                p, q, r, other = first[key]
+                hinges.append([p, q, r, c])
+                sides.append([other, e])
+            else:
+                first[key] = (a, b, c, e)
+    return np.array(hinges, np.int64).reshape(-1, 4), np.array(sides, np.int64).reshape(-1, 2)
 
 
-def _cotangent(u: FloatArray, v: FloatArray) -> FloatArray:
-    return np.asarray((u * v).sum(axis=-1) / np.linalg.norm(np.cross(u, v), axis=-1))
+def _hinge_form(body: Body, hinges: IntArray, sides: IntArray, weft_ratio: float, held: IntArray) -> FloatArray:
+    """Matrix ``(N, N)`` [1]: twice the bending energy over D as a form in the changes of angle."""
+    points, area = body.vertices, body.measures
+    corners = points[body.elements]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    rigid: BoolArray = np.all(np.isin(body.elements, held), axis=1)
+    warp = body.warp_directions(points)
+    by_triangle: list[list[tuple[int, int]]] = [[] for _ in area]
+    for h, pair in enumerate(sides.tolist()):
+        for e in pair:
+            by_triangle[e].append((h, pair[0]))
+    size = np.linalg.norm(points[hinges[:, 1]] - points[hinges[:, 0]], axis=1)
+    double = np.where(rigid[sides].any(axis=1), 2.0, 1.0)
+    rows: list[tuple[IntArray, FloatArray]] = []  # curvature (3, 3): what each hinge adds, as world tensors
+    for e, parts in enumerate(by_triangle):
+        which = np.array([h for h, _ in parts], np.int64)
+        # Seen from the first triangle of a hinge; a triangle wound the other way sees it with the other sign.
+        signs = np.array([1.0 if f == e or _agree(body, hinges[h], e) else -1.0 for h, f in parts])
+        edge = (points[hinges[which, 1]] - points[hinges[which, 0]]) / size[which, None]
+        across = np.cross(normal[e], edge)
+        tensor = np.einsum("h,hi,hj->hij", signs * double[which] * size[which] / (2 * area[e]), across, across)
+        rows.append((which, _without_free_edges(tensor, body, e, hinges[which], normal[e])))
+    form = np.zeros((len(hinges),) * 2)
+    root = np.array([weft_ratio**-0.125, weft_ratio**0.125])
+
+    def weighted(tensors: FloatArray, u: FloatArray, n: FloatArray) -> FloatArray:
+        frame = np.stack([u, np.cross(n, u)]) * root[:, None]
+        inside = np.einsum("ai,hij,bj->abh", frame, tensors, frame)
+        # The square sum of these four is S_uu^2 / sqrt r + S_vv^2 sqrt r + 2 S_uv^2.
+        return np.asarray(inside.reshape(4, -1))
+
+    for e, (which, tensor) in enumerate(rows):
+        part = weighted(tensor, warp[e], normal[e])
+        form[np.ix_(which, which)] += _UNAVERAGED * (0.0 if rigid[e] else area[e]) * part.T @ part
+    around: list[list[int]] = [[] for _ in points]
+    for e, triangle in enumerate(body.elements.tolist()):
+        for v in triangle:
+            around[v].append(e)
+    for near in around:
+        share = np.where(rigid[near], 0.0, area[near]) / 3.0
+        if not share.sum() > 0:
+            continue
+        facing = np.sign(normal[near] @ normal[near[0]])
+        facing[facing == 0] = 1.0
+        mean = (share * facing) @ normal[near]
+        mean /= np.linalg.norm(mean)
+        main = near[int(np.argmax(share))]
+        thread = _turned(normal[main] * facing[near.index(main)], mean) @ warp[main]
+        columns = np.unique(np.concatenate([rows[e][0] for e in near]))
+        total = np.zeros((len(columns), 3, 3))
+        for e, s, f in zip(near, share, facing, strict=True):
+            turn = _turned(f * normal[e], mean)
+            total[np.searchsorted(columns, rows[e][0])] += s * f * np.einsum("ia,hab,jb->hij", turn, rows[e][1], turn)
+        part = weighted(total, thread, mean)
+        form[np.ix_(columns, columns)] += (1 - _UNAVERAGED) / share.sum() * part.T @ part
+    return form
+
+
+def _agree(body: Body, hinge: IntArray, element: int) -> bool:
+    """Whether ``element`` runs through the edge of ``hinge`` against the first triangle, as on an oriented mesh."""
+    triangle = body.elements[element].tolist()
+    i = triangle.index(int(hinge[0]))
+    return bool(triangle[(i + 2) % 3] == int(hinge[1]))
+
+
+def _without_free_edges(
+    tensor: FloatArray, body: Body, element: int, hinges: IntArray, normal: FloatArray
+) -> FloatArray:
+    """Curvature across a free edge costs nothing: take it out of ``tensor (N, 3, 3)``."""
+    triangle = body.elements[element]
+    has = {tuple(sorted(h[:2].tolist())) for h in hinges}
+    free = []
+    for i in range(3):
+        a, b = int(triangle[i]), int(triangle[(i + 1) % 3])
+        if (min(a, b), max(a, b)) not in has:
+            edge = body.vertices[b] - body.vertices[a]
+            across = np.cross(normal, edge / np.linalg.norm(edge))
+            free.append(np.outer(across, across).ravel())
+    if not free:
+        return tensor
+    basis = np.linalg.qr(np.array(free).T)[0]
+    flat = tensor.reshape(len(tensor), 9)
+    return np.asarray((flat - flat @ basis @ basis.T).reshape(-1, 3, 3))
+
+
+def _turned(start: FloatArray, end: FloatArray) -> FloatArray:
+    """The smallest rotation ``(3, 3)`` that takes unit vector ``start`` to ``end``."""
+    axis, cosine = np.cross(start, end), float(start @ end)
+    if cosine < -0.999999:
+        return np.eye(3)
+    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + cosine))

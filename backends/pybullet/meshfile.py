@@ -1,41 +1,25 @@
-"""Temporary mesh files: Bullet takes meshes only from disk."""
+"""Temporary mesh files: Bullet takes soft bodies only from disk."""
 
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from ...core.body import Body
-
 
 @contextmanager
-def mesh_file(body: Body) -> Iterator[str]:
-    """Path of a file with the mesh, of a name never used before; removed on leaving.
+def node_file(count: int) -> Iterator[str]:
+    """Path of a Wavefront ``.obj`` of a name never used before, removed on leaving.
 
-    A cloth is written as Wavefront ``.obj`` and a solid as legacy ``.vtk``, the only format from which
-    Bullet makes tetrahedra.
+    All that is wanted of Bullet are ``count`` nodes. It has no such body: it needs faces that make the nodes
+    one connected piece (it hangs on loose ones), with corners that differ. A zigzag strip is the least, and costs
+    half of what a whole mesh does. Where the nodes are is said later.
     """
-    write, suffix = (_obj, ".obj") if body.kind == "cloth" else (_vtk, ".vtk")
-    handle, path = tempfile.mkstemp(suffix=suffix, prefix="muslin-")
+    points = [f"v {0.01 * k:.3f} {0.01 * (k % 2):.3f} 0" for k in range(count)]
+    faces = [f"f {k} {k + 1} {k + 2}" for k in range(1, count - 1)]
+    handle, path = tempfile.mkstemp(suffix=".obj", prefix="muslin-")
     try:
         with os.fdopen(handle, "w") as file:
-            file.write(write(body))
+            file.write("\n".join([*points, *faces]) + "\n")
         yield path
     finally:
         os.unlink(path)
-
-
-def _obj(body: Body) -> str:
-    points = [f"v {x:.17g} {y:.17g} {z:.17g}" for x, y, z in body.vertices.tolist()]
-    faces = [f"f {a} {b} {c}" for a, b, c in (body.elements + 1).tolist()]
-    return "\n".join([*points, *faces]) + "\n"
-
-
-def _vtk(body: Body) -> str:
-    points = [f"{x:.17g} {y:.17g} {z:.17g}" for x, y, z in body.vertices.tolist()]
-    cells = [f"4 {a} {b} {c} {d}" for a, b, c, d in body.elements.tolist()]
-    lines = ["# vtk DataFile Version 2.0", "muslin", "ASCII", "DATASET UNSTRUCTURED_GRID"]
-    lines += [f"POINTS {len(points)} double", *points]
-    lines += [f"CELLS {len(cells)} {5 * len(cells)}", *cells]
-    lines += [f"CELL_TYPES {len(cells)}", *["10"] * len(cells)]
-    return "\n".join(lines) + "\n"

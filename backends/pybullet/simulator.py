@@ -3,18 +3,20 @@
 from typing import ClassVar
 
 from ...core.errors import InputError
-from ...core.material import ClothMaterial
+from ...core.material import ClothMaterial, RopeMaterial
+from ...core.plate import is_flat, opposite_vertices
 from ...core.scene import Scene
 from ...core.simulator import Simulator, World
 from . import library
-from .bending import is_flat
+
+_SIZES = {"rope": "length", "cloth": "area", "solid": "volume"}
 
 
 class PybulletSimulator(Simulator):
-    """Bullet's deformable bodies.
+    """Bullet's deformable world with the elasticity computed here.
 
-    Cloth is a sheet that is flat at rest; see :class:`~muslin.backends.pybullet.cloth.ClothWorld` for what is
-    Bullet's and what is not. Solids are Bullet's Neo-Hookean tetrahedra. There is no contact of a body with itself.
+    :class:`~muslin.backends.pybullet.world.SoftWorld` says what is Bullet's and what is not. There is no contact
+    of a body with itself, and none of edges and faces: vertices touch.
 
     Args:
         time_step: of a world [s]. Inside it as many substeps are made as explicit elasticity needs.
@@ -22,8 +24,19 @@ class PybulletSimulator(Simulator):
     """
 
     name: ClassVar[str] = "pybullet"
-    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "solid"})
-    capabilities: ClassVar[frozenset[str]] = frozenset({"table"})
+    object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
+    capabilities: ClassVar[frozenset[str]] = frozenset(
+        {
+            "table",
+            "cylinder",
+            "static-mesh",
+            "anisotropy",
+            "curved-rest",
+            "start-shape",
+            "varying-stiffness",
+            "contact-forces",
+        }
+    )
 
     def __init__(self, *, time_step: float = 0.005, most_substeps: int = 500) -> None:
         if not 0 < time_step < float("inf"):
@@ -35,26 +48,29 @@ class PybulletSimulator(Simulator):
 
     def check(self, scene: Scene) -> None:
         super().check(scene)
-        if not scene.body.measures.min() > 0:
-            raise InputError(f"element {int(scene.body.measures.argmin())} of the mesh has no {_size(scene)}")
-        if scene.body.kind == "cloth" and not is_flat(scene.body):
-            raise InputError(
-                "simulator 'pybullet' bends only cloth that starts flat, but the vertices do not lie in one plane; "
-                "start from a flat sheet, or take another simulator"
-            )
+        body = scene.body
+        if not body.measures.min() > 0:
+            raise InputError(f"element {int(body.measures.argmin())} of the mesh has no {_SIZES[body.kind]}")
+        if body.kind == "cloth":
+            opposite_vertices(body)
 
     def open(self, scene: Scene) -> World:
-        # Imported here, since the two worlds and the engine are not needed to name or describe the simulator.
-        from .cloth import ClothWorld
-        from .solid import SolidWorld
+        # Imported here, since they and the engine are not needed to name or describe the simulator.
+        from .bending import CurvedBending, FlatBending
+        from .membrane import Membrane
+        from .rod import Rod
+        from .volume import Volume
+        from .world import SoftWorld
 
-        if isinstance(scene.material, ClothMaterial):
-            return ClothWorld(scene, scene.material, self.time_step, self.most_substeps)
-        return SolidWorld(scene, scene.material, self.time_step, self.most_substeps)
+        library.bullet()  # also where nothing can be touched and Bullet would not be asked for anything
+        material, body = scene.material, scene.body
+        if isinstance(material, ClothMaterial):
+            made = FlatBending if is_flat(body) else CurvedBending
+            bending = made(body, material.bending_rigidity, material.weft_bending_ratio, scene.held)
+            return SoftWorld(scene, self.time_step, self.most_substeps, Membrane(body, material, bending))
+        if isinstance(material, RopeMaterial):
+            return SoftWorld(scene, self.time_step, self.most_substeps, Rod(body, material, scene.held))
+        return SoftWorld(scene, self.time_step, self.most_substeps, Volume(body, material))
 
     def engine_version(self) -> str:
         return library.version()
-
-
-def _size(scene: Scene) -> str:
-    return "area" if scene.body.kind == "cloth" else "volume"

@@ -28,9 +28,10 @@ class Snapshot:
         title: of the picture.
         predicted, measured: ``(P, 3)``.
         vertices: ``(V, 3)`` or None.
-        triangles: ``(F, 3)`` or None.
+        triangles: ``(F, 3)`` or None; none of a rope, which is a line through its vertices.
         correspondence: measured point p is predicted point p.
         clamped: vertices that cannot be wrong, because they never move.
+        outlines: of what stands around the object, lines ``(n, 3)``.
     """
 
     title: str
@@ -40,6 +41,7 @@ class Snapshot:
     triangles: IntArray | None
     correspondence: bool = True
     clamped: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    outlines: tuple[FloatArray, ...] = ()
 
     @property
     def paired(self) -> bool:
@@ -79,7 +81,9 @@ def snapshots(take: Take, after_name: str, frame: int | None = None) -> list[Sna
         flat = None if take.vertices_after is None or take.triangles is None else take.vertices_after[k]
         out.append(Snapshot(f"with {after_name}", take.predicted_after[k], take.measured[k], flat, take.triangles))
     clamped = clamped_vertices(take.vertices)
-    return [_spatial(replace(s, correspondence=take.correspondence, clamped=clamped)) for s in out]
+    return [
+        _spatial(replace(s, correspondence=take.correspondence, clamped=clamped, outlines=take.outlines)) for s in out
+    ]
 
 
 def clamped_vertices(vertices: FloatArray | None) -> IntArray:
@@ -125,8 +129,16 @@ def best_view(shots: list[Snapshot]) -> FloatArray:
 def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray) -> None:
     """One snapshot in parallel projection, far triangles first."""
     flat = shot.predicted @ view.T
+    around = [(line @ view.T)[:, :2] for line in shot.outlines]
+    axes.add_collection(LineCollection(around, colors=SOFT, linewidths=0.7, alpha=0.6, zorder=0))
     if shot.vertices is not None and shot.triangles is not None:
         seen, errors = shot.vertices @ view.T, shot.vertex_errors()
+        if not len(shot.triangles):
+            colours = ERROR_MAP(norm(0.5 * (errors[1:] + errors[:-1])))
+            pieces = list(np.stack([seen[:-1, :2], seen[1:, :2]], axis=1))
+            rim = LineCollection(pieces, colors=SOFT, linewidths=4.6, capstyle="round", zorder=1)
+            axes.add_collection(rim)
+            axes.add_collection(LineCollection(pieces, colors=colours, linewidths=3.6, capstyle="round", zorder=1))
         order = np.argsort(seen[shot.triangles, 2].mean(axis=1))
         faces = shot.triangles[order]
         colours = ERROR_MAP(norm(errors[faces].mean(axis=1)))

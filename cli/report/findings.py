@@ -21,7 +21,8 @@ class Take:
         before, after, scatter: error over time ``(T,)``; None where not known.
         measured, predicted, predicted_after: ``(T, P, 3)``.
         vertices, vertices_after: ``(T, V, 3)``.
-        triangles: ``(F, 3)``.
+        triangles: ``(F, 3)``; none of a rope, whose vertices follow each other.
+        outlines: of what stands around the object, lines ``(n, 3)``.
         point_before, point_after: error of each point over all time ``(P,)``.
         rmse_before, rmse_after: root mean square over all of it.
         correspondence: point p of the measurement is point p of the prediction.
@@ -40,6 +41,7 @@ class Take:
     vertices: FloatArray | None = None
     vertices_after: FloatArray | None = None
     triangles: IntArray | None = None
+    outlines: tuple[FloatArray, ...] = ()
     point_before: FloatArray | None = None
     point_after: FloatArray | None = None
     rmse_before: float | None = None

@@ -11,8 +11,10 @@ from ...core.arrays import FloatArray
 from ...core.errors import MuslinError, StepMissingError
 from ...core.measurement_store import read_hidden
 from ...core.store import read
+from ...core.study.objects import obstacles_of
 from ...core.study.study import Study
 from .findings import Findings, Posterior, Table, Take, number
+from .outlines import outlines
 
 
 def gather(study: Study, after: Study | None = None) -> Findings:
@@ -29,7 +31,7 @@ def gather(study: Study, after: Study | None = None) -> Findings:
         name = ", ".join(e for e in after.config.effects if e not in study.config.effects) or after.path.stem
     else:
         name = _shown_effect(result)
-    takes = _takes(compare, diagnose, other, _correspondence(study))
+    takes = [_surrounded(t, study) for t in _takes(compare, diagnose, other, _correspondence(study))]
     if not name or not any(t.after is not None for t in takes):
         takes = [t.without_after() for t in takes]
         name = ""
@@ -79,6 +81,17 @@ def _correspondence(study: Study) -> dict[str, bool]:
         return {r.name: r.series.correspondence for r in study.measurement.recordings}
     except MuslinError:
         return {}
+
+
+def _surrounded(take: Take, study: Study) -> Take:
+    if take.vertices is None or take.unit != "m":
+        return take
+    try:
+        obstacles = obstacles_of(study.config.scenario, study.path.parent)
+    except MuslinError:  # a mesh may have been moved away since
+        return take
+    flat = take.vertices.reshape(-1, 3)
+    return replace(take, outlines=tuple(outlines(obstacles, np.nanmin(flat, axis=0), np.nanmax(flat, axis=0))))
 
 
 def _hidden(study: Study) -> Table | None:

@@ -67,6 +67,7 @@ def _pack(take: Take, name: str, frames: list[int]) -> str:
         "view": np.round(best_view(film[worst]), 5).tolist(),
         "triangles": np.asarray(take.triangles).ravel().tolist(),
         "measured": packed(measured),
+        "outlines": [packed(line) for line in film[worst][0].outlines if (np.abs(line - centre) < reach).all()],
         "models": models,
         "reach": reach,
     }

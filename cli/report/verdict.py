@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from ...core.errors import MuslinError
-from ...core.scenarios import preset
+from ...core.study.objects import object_of
 from .findings import Findings, number
 from .words import errors, length, sentence, words
 
@@ -30,7 +30,7 @@ class Verdict:
 def thing(found: Findings) -> str:
     """What is being looked at, in one word."""
     try:
-        kind = preset(found.study.config.scenario.name).kind
+        kind = object_of(found.study.config.scenario, found.study.path.parent).kind
     except MuslinError:
         return "object"
     return kind if kind in ("cloth", "rope") else "object"

@@ -9,6 +9,7 @@ for (const player of document.querySelectorAll(".player")) {
   const measured = shorts(film.measured), points = measured.length / frames / 3;
   const models = film.models.map((m) => ({ title: m.title, rms: m.rms, vertices: shorts(m.vertices),
     predicted: m.predicted ? shorts(m.predicted) : null, heat: bytes(m.heat) }));
+  const outlines = film.outlines.map(shorts);
   const count = models[0].heat.length / frames;
   const stops = [[233, 235, 230], [243, 211, 156], [229, 143, 79], [185, 59, 34], [94, 20, 18]];
   const colours = Array.from({ length: 256 }, (_, i) => {
@@ -52,6 +53,21 @@ for (const player of document.querySelectorAll(".player")) {
       context.save();
       context.beginPath(); context.rect(width * m, 0, width, canvas.height); context.clip();
       const mesh = project(model.vertices, frame * count * 3, count, rows, spot);
+      context.strokeStyle = "rgba(31,38,45,0.35)"; context.lineWidth = 1;
+      for (const line of outlines) {
+        const seen = project(line, 0, line.length / 3, rows, spot);
+        context.beginPath();
+        for (let p = 0; p < line.length; p += 3) context.lineTo(seen[p], seen[p + 1]);
+        context.stroke();
+      }
+      if (!triangles.length) {  // a rope: a line through its vertices
+        context.lineCap = "round"; context.lineWidth = 7;
+        for (let v = 0; v + 1 < count; v++) {
+          const heat = (model.heat[frame * count + v] + model.heat[frame * count + v + 1]) / 2;
+          context.strokeStyle = colours[Math.round(heat)]; context.beginPath();
+          context.moveTo(mesh[3 * v], mesh[3 * v + 1]); context.lineTo(mesh[3 * v + 3], mesh[3 * v + 4]); context.stroke();
+        }
+      }
       const order = [];
       for (let k = 0; k < triangles.length; k += 3) {
         order.push([mesh[3 * triangles[k] + 2] + mesh[3 * triangles[k + 1] + 2] + mesh[3 * triangles[k + 2] + 2], k]);

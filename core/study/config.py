@@ -1,17 +1,22 @@
 """The study file: one TOML table a topic, every key checked."""
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import numpy as np
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..errors import InputError, MissingFileError
-from ..obstacles import Cylinder, Table
+from ..importing.mesh import read_closed_surface
+from ..obstacles import Cylinder, StaticMesh, Table
 from ..registry import nearest
 from ..store import write_text
+
+#: x, y, z [m].
+Point = tuple[float, float, float]
 
 
 class _Table(BaseModel):
@@ -30,13 +35,14 @@ class _OpenTable(BaseModel):
 
 
 class StudyTable(_Table):
-    """``[study]``: what is fitted on what."""
+    """``[study]``: what is fitted on what; a simulation that takes longer than ``time_limit`` [s] has failed."""
 
     measurement: str
     fit_on: list[str] | None = None
     hold_out: list[str] = Field(default_factory=list)
     results: str | None = None
     seed: int = Field(default=0, ge=0)
+    time_limit: float = Field(default=120.0, gt=0)
 
 
 class TableTable(_Table):
@@ -46,7 +52,7 @@ class TableTable(_Table):
     height: float
     friction: float = Field(default=1.0, ge=0)
 
-    def build(self) -> Table:
+    def build(self, folder: Path) -> Table:
         return Table(self.height, self.friction)
 
 
@@ -54,27 +60,86 @@ class CylinderTable(_Table):
     """An obstacle ``{ kind = "cylinder", ... }``: see :class:`~muslin.core.obstacles.Cylinder`."""
 
     kind: Literal["cylinder"]
-    center: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    center: Point
+    axis: Point
     radius: float = Field(gt=0)
     length: float = Field(gt=0)
     friction: float = Field(default=1.0, ge=0)
 
-    def build(self) -> Cylinder:
+    def build(self, folder: Path) -> Cylinder:
         return Cylinder(np.array(self.center), np.array(self.axis), self.radius, self.length, self.friction)
 
 
+class MeshTable(_Table):
+    """An obstacle ``{ kind = "mesh", ... }``: see :class:`~muslin.core.obstacles.StaticMesh`."""
+
+    kind: Literal["mesh"]
+    file: str
+    scale: float = Field(default=1.0, gt=0)
+    up: Literal["x", "y", "z"] = "z"
+    position: Point = (0.0, 0.0, 0.0)
+    friction: float = Field(default=1.0, ge=0)
+
+    def build(self, folder: Path) -> StaticMesh:
+        vertices, triangles = read_closed_surface(folder / self.file, self.scale, self.up)
+        return StaticMesh(vertices + np.array(self.position), triangles, self.friction)
+
+
+ObstacleTable = Annotated[TableTable | CylinderTable | MeshTable, Field(discriminator="kind")]
+
+
 class ScenarioTable(_Table):
-    """``[scenario]``: the object and how it is held; every key but the name overrides a built-in."""
+    """``[scenario]``: the object and how it is held; every key but the name overrides a built-in.
+
+    ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says
+    in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
+    first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
+    as it stands in the world at the start.
+    """
 
     name: str
     size: list[float] | None = None
     vertices: list[int] | None = None
+    mesh: str | None = None
+    mesh_scale: float = Field(default=1.0, gt=0)
+    mesh_up: Literal["x", "y", "z"] = "z"
+    straight_rest: bool = False
+    frame: Literal["gripper", "upright", "world"] = "gripper"
     grasps: list[list[int]] | None = None
+    grasp_points: list[Point | list[Point]] | None = None
+    grasp_radius: float = Field(default=0.0, ge=0)
     markers: list[int] | Literal["all", "bound"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
-    obstacles: list[TableTable | CylinderTable] | None = None
+    obstacles: list[ObstacleTable] | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """The meshes that it names, as they are written."""
+        meshes = [o.file for o in self.obstacles or [] if isinstance(o, MeshTable)]
+        return [*([self.mesh] if self.mesh is not None else []), *meshes]
+
+    def move_files(self, to: Callable[[str], str]) -> None:
+        """Name every mesh anew."""
+        if self.mesh is not None:
+            self.mesh = to(self.mesh)
+        for obstacle in self.obstacles or []:
+            if isinstance(obstacle, MeshTable):
+                obstacle.file = to(obstacle.file)
+
+    @model_validator(mode="after")
+    def _one_object(self) -> "ScenarioTable":
+        if self.mesh is None:
+            for key in ("mesh_scale", "mesh_up", "straight_rest"):
+                if key in self.model_fields_set:
+                    raise ValueError(f"{key} says how to take a mesh, but there is none; add mesh = 'FILE'")
+        elif self.size is not None:
+            raise ValueError("size does not go with a mesh, which has one of its own; use mesh_scale")
+        if self.grasps is not None and self.grasp_points is not None:
+            raise ValueError("grasps and grasp_points both say what is held; keep one of them")
+        if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
+            raise ValueError("grasp_radius goes with grasp_points, which are missing")
+        return self
 
 
 class EstimatorTable(_OpenTable):
@@ -162,11 +227,24 @@ def parse_config(table: dict[str, Any], where: str) -> StudyConfig:
 
 
 def _known_keys(loc: tuple[int | str, ...]) -> list[str]:
-    model: Any = StudyConfig
+    """Keys of the table that ``loc`` names but for its last part."""
+    models: list[Any] = [StudyConfig]
     for part in loc[:-1]:
-        field = getattr(model, "model_fields", {}).get(str(part))
-        model = field.annotation if field is not None else ParameterTable
-    return list(getattr(model, "model_fields", StudyConfig.model_fields))
+        fields = [m.model_fields[str(part)] for m in models if str(part) in m.model_fields]
+        inner = [table for f in fields for table in _models(f.annotation)]
+        # what is not a field is an index, a name that the user chose, or the kind of an obstacle
+        kinds = [m for m in models if part in get_args(getattr(m.model_fields.get("kind"), "annotation", None))]
+        models = inner or kinds or models
+    return list(dict.fromkeys(name for m in models for name in m.model_fields))
+
+
+def _models(annotation: Any) -> list[Any]:
+    """The tables that a value of this type may be, through lists, dictionaries and unions."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if get_origin(annotation) is None:
+        return []
+    return [m for part in get_args(annotation) for m in _models(part)]
 
 
 def read_config(path: Path) -> StudyConfig:

@@ -2,104 +2,56 @@
 
 import os
 import pickle
-import signal
 import tempfile
-import threading
-import time
-from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
-from multiprocessing import get_context
+import warnings
+from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
+from queue import SimpleQueue
 from types import TracebackType
 
 from threadpoolctl import threadpool_limits
 
-from ..errors import MuslinError, RolloutFailed
-from ..rollout import Trajectory
+from ..errors import InputError, MuslinError
 from .problem import Problem
+from .worker import CannotStart, Failure, Outcome, Task, Worker, simulate
 
-
-@dataclass(frozen=True)
-class Task:
-    """One rollout: parameter values and the recording whose motion is simulated."""
-
-    values: Mapping[str, float]
-    recording: str
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A rollout that did not end well, and why."""
-
-    reason: str
-
-
-Outcome = Trajectory | Failure
-
-_PROBLEM: Problem | None = None
-
-
-def _start_worker(file: str) -> None:
-    global _PROBLEM
-    _PROBLEM = pickle.loads(Path(file).read_bytes())
-    # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # One thread of linear algebra a process: more only get in each other's way, and the order in which
-    # they add up would make results depend on the number of workers.
-    threadpool_limits(1)
-    threading.Thread(target=_die_with_parent, args=(os.getppid(),), daemon=True).start()
-
-
-def _die_with_parent(parent: int) -> None:
-    """A parent that is killed outright cannot end its workers; they notice and end themselves."""
-    while os.getppid() == parent:
-        time.sleep(1.0)
-    os._exit(1)
-
-
-def _run(problem: Problem, task: Task) -> Outcome:
-    try:
-        return problem.simulate(task.values, task.recording)
-    except RolloutFailed as failure:
-        return Failure(str(failure))
-
-
-def _run_in_worker(task: Task) -> Outcome:
-    assert _PROBLEM is not None
-    return _run(_PROBLEM, task)
-
-
-def _ready() -> bool:
-    return _PROBLEM is not None
-
+__all__ = ["Failure", "Outcome", "SimulationPool", "Task"]
 
 _NO_WORKERS = (
     "worker processes cannot start. In a script of your own, put what runs under: if __name__ == '__main__'. "
     "A plugin that was made in a notebook cannot travel to another process: put it into a module, or use workers=1"
 )
-
-
-def _executor(workers: int, file: str) -> ProcessPoolExecutor:
-    # spawn: a fork of a process with engine or torch threads may hang
-    return ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_start_worker, initargs=(file,))
+_HERE = (
+    "no worker process can start, so simulations run in this process, where an engine that hangs or crashes cannot "
+    "be ended"
+)
 
 
 class SimulationPool:
     """Runs tasks of one problem. The outcome of a task depends on the task alone, not on the workers.
 
+    Nothing that an engine does ends a batch: an exception, a process that dies and a process that hangs beyond
+    the problem's time limit all fail one task, and a new process takes the place of the lost one.
+
     Args:
         problem: sent to every worker once.
-        workers: processes; 1 runs in this process; None takes one a core.
+        workers: processes; None takes one a core. With 1, a problem that cannot travel to a process (a plugin
+            made in a notebook, a script without a main guard) is simulated in this one instead, with a warning.
+            0 always does that: no process to wait for, but an engine that hangs or crashes cannot be ended;
+            the time limit holds between steps alone.
     """
 
     def __init__(self, problem: Problem, workers: int | None = None) -> None:
         self.problem = problem
         self.workers = workers if workers is not None else (os.cpu_count() or 1)
         self.count = 0  # rollouts run
-        self._executor: ProcessPoolExecutor | None = None
+        self._threads: ThreadPoolExecutor | None = None
+        self._idle: SimpleQueue[Worker | None] = SimpleQueue()  # None: a process yet to be started
+        self._busy: set[Worker] = set()
         self._file: str | None = None
+        self._accepted = False  # the study has been simulated, well or not, at least once
+        self._closed = False
 
     def __enter__(self) -> "SimulationPool":
         return self
@@ -107,83 +59,110 @@ class SimulationPool:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._executor is not None:
-            self._executor.shutdown(wait=True, cancel_futures=True)
-            self._executor = None
+        self._closed = True
+        if self._threads is not None:
+            self._threads.shutdown(wait=False, cancel_futures=True)
+            for worker in list(self._busy):  # after an interruption
+                worker.kill()
+            for _ in range(self.workers):
+                idle = self._idle.get()
+                if idle is not None:
+                    idle.end()
+            self._threads = None
         if self._file is not None:
             Path(self._file).unlink(missing_ok=True)
             self._file = None
 
-    def _travel(self) -> str:
-        """The problem in a file for workers to read.
+    def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
+        """Outcomes in the order of ``tasks``.
 
-        Given as an argument it would have to fit into a pipe: Python waits for ever when a process dies
-        before it has read all of a larger one, as happens in a script without a main guard.
+        Raises:
+            InputError: every task is refused by muslin or a plugin, and so was every one before: that is not a
+                matter of numbers.
+            MuslinError: no worker process can start.
         """
+        tasks = list(tasks)
+        self.count += len(tasks)
+        refused: list[Failure] = []
+        for outcome in self._outcomes(tasks):
+            if not self._accepted and isinstance(outcome, Failure) and outcome.refused:
+                refused.append(outcome)
+                continue
+            self._accepted = True
+            yield from refused
+            refused = []
+            yield outcome
+        if refused:
+            raise InputError(refused[0].reason)
+
+    def _outcomes(self, tasks: list[Task]) -> Iterator[Outcome]:
+        if self.workers > 0 and tasks:
+            try:
+                self._start(len(tasks))
+            except CannotStart as error:
+                if self.workers > 1:
+                    raise MuslinError(f"{_NO_WORKERS} ({error})") from error
+                warnings.warn(f"{_HERE} ({error})", stacklevel=4)
+                self.workers = 0
+        if self._threads is None:
+            for task in tasks:
+                with threadpool_limits(1):  # not across the yield: what the caller does is not ours to limit
+                    outcome = simulate(self.problem, task)
+                yield outcome
+            return
+        futures: list[Future[Outcome]] = [self._threads.submit(self._run, t) for t in tasks]
+        try:
+            for future in futures:
+                yield future.result()
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def _start(self, tasks: int) -> None:
+        """Start as many workers as there is work for; the others come as they are needed."""
+        if self._threads is not None:
+            return
+        file, now = self._travel(), min(self.workers, tasks)
+        threads = ThreadPoolExecutor(self.workers)
+        starting = [threads.submit(Worker, file) for _ in range(now)]
+        wait(starting)
+        failed = next((e for e in (f.exception() for f in starting) if e is not None), None)
+        for future in starting:
+            if failed is None:
+                self._idle.put(future.result())
+            elif future.exception() is None:
+                future.result().end()
+        if failed is not None:
+            threads.shutdown()
+            raise failed
+        for _ in range(self.workers - now):
+            self._idle.put(None)
+        self._threads = threads
+
+    def _travel(self) -> str:
+        """The problem in a file for workers to read."""
         if self._file is None:
             try:
                 content = pickle.dumps(self.problem)
             except (pickle.PicklingError, AttributeError, TypeError) as error:
-                raise MuslinError(f"{_NO_WORKERS} ({error})") from error
+                raise CannotStart(str(error)) from error
             with tempfile.NamedTemporaryFile(prefix="muslin-", suffix=".problem", delete=False) as file:
                 file.write(content)
             self._file = file.name
         return self._file
 
-    def _open(self) -> ProcessPoolExecutor:
-        if self._executor is None:
-            self._executor = _executor(self.workers, self._travel())
-        return self._executor
-
-    def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """Outcomes in the order of ``tasks``. A worker that dies fails its task and is replaced."""
-        tasks = list(tasks)
-        self.count += len(tasks)
-        if self.workers == 1:
-            for task in tasks:
-                with threadpool_limits(1):  # not across the yield: what the caller does is not ours to limit
-                    outcome = _run(self.problem, task)
-                yield outcome
-            return
-        futures: list[Future[Outcome]] = [self._submit(t) for t in tasks]
-        for k, future in enumerate(futures):
-            try:
-                yield future.result()
-            except BrokenProcessPool:
-                yield self._alone(tasks[k])
-                # whatever was queued behind the broken pool goes to a new one
-                for j in range(k + 1, len(tasks)):
-                    if not (futures[j].done() and futures[j].exception() is None):
-                        futures[j] = self._submit(tasks[j])
-
-    def _submit(self, task: Task) -> Future[Outcome]:
+    def _run(self, task: Task) -> Outcome:
+        """In a thread of this process: hand the task to a worker and wait for it."""
+        worker = self._idle.get()
         try:
-            return self._open().submit(_run_in_worker, task)
-        except BrokenProcessPool:  # a worker died while the pool was idle
-            self._drop()
-            return self._open().submit(_run_in_worker, task)
-
-    def _drop(self) -> None:
-        if self._executor is not None:
-            self._executor.shutdown(wait=False, cancel_futures=True)
-            self._executor = None
-
-    def _alone(self, task: Task) -> Outcome:
-        """Run a task that was in a pool that broke in a process of its own, to learn whether it was the cause.
-
-        Raises:
-            MuslinError: no worker process can start at all.
-        """
-        self._drop()
-        executor = _executor(1, self._travel())
-        try:
-            try:
-                executor.submit(_ready).result()
-            except BrokenProcessPool as error:
-                raise MuslinError(_NO_WORKERS) from error
-            try:
-                return executor.submit(_run_in_worker, task).result()
-            except BrokenProcessPool:
-                return Failure("the simulator took its process down")
+            if worker is not None and not worker.alive:  # it died over its last task, or while it was idle
+                worker.end()
+                worker = None
+            if worker is None:
+                worker = Worker(self._travel())
+            self._busy.add(worker)
+            return Failure("interrupted") if self._closed else worker.run(task, self.problem.time_limit)
         finally:
-            executor.shutdown(wait=False, cancel_futures=True)
+            if worker is not None:
+                self._busy.discard(worker)
+            self._idle.put(worker)

@@ -3,23 +3,25 @@
 import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..effect import Effect
-from ..errors import InputError
+from ..errors import InputError, RolloutFailed
 from ..extractor import KeypointExtractor
-from ..material import DEFAULT_PRIORS, MATERIALS, UNITS, Material, with_fields
+from ..material import UNITS, Material, with_fields
 from ..measurement import Measurement, Recording
 from ..parameters import Parameter, ParameterSpace
 from ..registry import REGISTRY, nearest
 from ..rollout import Trajectory, rollout
-from ..scenario import Scenario, bound_markers, marker_weights
+from ..sanity import SanityCheck
+from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
+from .objects import build_scenario, check_unstretched
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +37,7 @@ class Problem:
         space: parameters to infer, coefficients of effects included.
         fixed: values of effect coefficients that are not inferred.
         effects: classes of every effect that a value may name.
+        time_limit: on the computation of one rollout [s]; None for none.
     """
 
     recordings: dict[str, Recording]
@@ -47,6 +50,7 @@ class Problem:
     space: ParameterSpace
     fixed: dict[str, float]
     effects: dict[str, type[Effect]]
+    time_limit: float | None = None
 
     def simulate(self, values: Mapping[str, float], recording: str) -> Trajectory:
         """One rollout; ``values`` names material fields, ``scale``, and ``effect.coefficient``.
@@ -66,9 +70,8 @@ class Problem:
             else:
                 given[name] = float(value)
         effects = [self.effects[name](**c) for name, c in coefficients.items()]
-        trajectory = rollout(
-            self.simulator, self.scenarios[recording], with_fields(self.material, given), effects, scale
-        )
+        material, scenario = with_fields(self.material, given), self.scenarios[recording]
+        trajectory = rollout(self.simulator, scenario, material, effects, scale, self.time_limit)
         seen = self.extractor.extract(trajectory.series, trajectory.series.time)
         return replace(trajectory, series=seen)
 
@@ -78,8 +81,14 @@ class Problem:
         return replace(self, space=self.space + ParameterSpace(extra))
 
 
-def build_problem(config: StudyConfig, measurement: Measurement) -> Problem:
-    """Resolve a study; every name in it is checked here, before anything is simulated."""
+def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = Path()) -> Problem:
+    """Resolve a study; every name in it is checked here, before anything is simulated.
+
+    Args:
+        config: of the study.
+        measurement: what it is about.
+        folder: of the study file, where paths to meshes start.
+    """
     fit_on = tuple(config.study.fit_on or [n for n in measurement.names if n not in config.study.hold_out])
     hold_out = tuple(config.study.hold_out)
     if not fit_on:
@@ -87,21 +96,44 @@ def build_problem(config: StudyConfig, measurement: Measurement) -> Problem:
     used = {n: measurement[n] for n in (*fit_on, *hold_out)}
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
-    scenarios = {n: _scenario(config, r) for n, r in recordings.items()}
-    kind = base.kind
-    material = with_fields(MATERIALS[kind](), dict(config.material))
+    scenarios = {n: build_scenario(config.scenario, r, folder) for n, r in recordings.items()}
+    kind = scenarios[fit_on[0]].body.kind
+    material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
     for name in config.diagnose.candidates or []:
         REGISTRY.get("effect", name)
+    for n, effect in effects.items():
+        if kind not in effect.object_kinds:
+            raise InputError(f"[effects.{n}] is for {' and '.join(sorted(effect.object_kinds))}, but this is a {kind}")
     coefficients, fixed = _effect_values(config, effects)
-    space = ParameterSpace(_parameters(config, kind, material) + coefficients)
+    space = ParameterSpace((_parameters(config, material) or base.default_priors(kind)) + coefficients)
     simulator = _plugin("simulator", config.simulator.name, config.simulator.options)
     extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
-    if kind not in simulator.object_kinds:
-        raise InputError(f"simulator {config.simulator.name!r} cannot do scenario {base.kind!r} objects")
     if extractor.needs_images:
         raise InputError(f"extractor {config.extractor.name!r} needs images, but the measurement holds points")
-    return Problem(recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects)
+    scales = {1.0, *(bound for p in space if p.name == "scale" for bound in (p.low, p.high))}
+    for name, scenario in scenarios.items():
+        for scale in sorted(scales):
+            _check_start(simulator, scenario, material, scale, name)
+    limit = config.study.time_limit
+    return Problem(
+        recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects, limit
+    )
+
+
+def _check_start(simulator: Simulator, scenario: Scenario, material: Material, scale: float, recording: str) -> None:
+    """What would fail in every simulated draw is said now."""
+    sized = "" if scale == 1.0 else f" at scale {scale:g}"
+    scene = scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY]), scale)
+    simulator.check(scene)
+    check_unstretched(scenario, scale, f"recording {recording!r}{sized}")
+    try:
+        SanityCheck(scene)(scene.start_positions, float(scenario.times[0]))
+    except RolloutFailed as error:
+        raise InputError(
+            f"recording {recording!r}{sized}: the object cannot start like this: {error}; check [scenario] obstacles "
+            "and frame, the gripper poses and --up"
+        ) from error
 
 
 def _plugin(kind: str, name: str, options: dict[str, Any]) -> Any:
@@ -131,71 +163,13 @@ def _keep_points(recording: Recording, points: list[int] | None) -> Recording:
     return replace(recording, series=replace(series, points=series.points[:, points]))
 
 
-def _scenario(config: StudyConfig, recording: Recording) -> Scenario:
-    table, base = config.scenario, preset(config.scenario.name)
-    body = base.body(table.size, table.vertices)
-    grasps = base.grasps(body) if table.grasps is None else tuple(np.array(g, np.int64) for g in table.grasps)
-    plain = Scenario(
-        name=table.name,
-        body=body,
-        grasps=grasps,
-        motion=recording.gripper or base.motion(),
-        times=recording.series.time,
-        markers=np.eye(len(body.vertices)),
-        load_vertices=base.load_vertices(body),
-        obstacles=base.obstacles if table.obstacles is None else tuple(o.build() for o in table.obstacles),
-        settle=base.settle if table.settle is None else table.settle,
-    ).for_recording(recording)
-    return replace(plain, markers=_markers(table.markers, plain, recording))
-
-
-def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Recording) -> FloatArray:
-    count, points = len(scenario.body.vertices), recording.series.points
-    if recording.series.unit == "px":
-        raise InputError(
-            f"recording {recording.name!r} is in pixels; only points in metres can be compared without a camera"
-        )
-    if points.shape[2] != 3:
-        raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
-    if choice == "bound":
-        if scenario.settle > 0:
-            raise InputError(
-                "[scenario] markers = 'bound' ties each marker to the object in its rest shape, so it cannot go with "
-                f"settle = {scenario.settle:g}; set settle = 0, or name the vertices under the markers"
-            )
-        seen = recording.series.valid[0]
-        if not seen.all():
-            raise InputError(
-                f"recording {recording.name!r}: marker {int(np.argmin(seen))} is not seen in the first frame, "
-                "so it cannot be bound to the object; start the recording later or give [scenario.markers] vertices"
-            )
-        return bound_markers(scenario.world_vertices(), points[0])
-    if isinstance(choice, list):
-        weights = marker_weights(count, np.array(choice, np.int64))
-        if recording.series.correspondence and len(weights) != points.shape[1]:
-            raise InputError(
-                f"[scenario.markers] names {len(weights)} vertices, "
-                f"but recording {recording.name!r} has {points.shape[1]} points"
-            )
-        return weights
-    if recording.series.correspondence and points.shape[1] != count:
-        raise InputError(
-            f"recording {recording.name!r} has {points.shape[1]} points, the mesh {count} vertices; say where the "
-            "markers sit: [scenario] markers = [vertex, ...], or markers = 'bound' to tie each to the object where "
-            "it is in the first frame, or import without --correspondence"
-        )
-    return np.eye(count)
-
-
-def _parameters(config: StudyConfig, kind: str, material: Material) -> tuple[Parameter, ...]:
-    if not config.parameters:
-        return DEFAULT_PRIORS[kind]
+def _parameters(config: StudyConfig, material: Material) -> tuple[Parameter, ...]:
     out = []
     for name, table in config.parameters.items():
         if name not in (*(f.name for f in fields(material)), "scale"):
             known = [*(f.name for f in fields(material)), "scale"]
             raise InputError(f"[parameters.{name}]: unknown.{nearest(name, known)} Known: {', '.join(known)}")
-        out.append(_parameter(name, table, UNITS[kind][name], f"parameters.{name}"))
+        out.append(_parameter(name, table, UNITS[material.kind][name], f"parameters.{name}"))
         for bound in (table.low, table.high):
             _check_bound(material, name, bound)
     return tuple(out)

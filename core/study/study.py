@@ -68,13 +68,13 @@ class Study:
 
     @cached_property
     def problem(self) -> Problem:
-        return build_problem(self.config, self.measurement)
+        return build_problem(self.config, self.measurement, self.path.parent)
 
     def pool(self, problem: Problem | None = None) -> SimulationPool:
         return SimulationPool(problem or self.problem, self.workers)
 
     def fingerprint(self, step: str = "fit") -> dict[str, Any]:
-        """What the result of a step depends on: study file and measured numbers. Another one, another result.
+        """What the result of a step depends on: study file, meshes and measured numbers. Another one, another result.
 
         A fit depends on held-out recordings only where they are repeats, which tell the noise; compare
         and diagnose on all of them.
@@ -89,6 +89,9 @@ class Study:
         names = {r.name for pair in repeats(problem.recordings.values()) for r in pair} | set(problem.fit_on)
         used = [r for n, r in problem.recordings.items() if n in names or step != "fit"]
         table["measured"] = {r.name: _digest(r) for r in used}
+        for name in self.config.scenario.files:
+            content = (self.path.parent / name).read_bytes()
+            table.setdefault("meshes", {})[name] = hashlib.sha256(content).hexdigest()
         return table
 
     def set_aside(self) -> Path | None:
@@ -159,6 +162,7 @@ class Study:
             config.study.results = f"{path.stem}.results.zarr"
         if path.parent.resolve() != self.path.parent.resolve():
             config.study.measurement = str(self.measurement_path.resolve())
+            config.scenario.move_files(lambda name: str((self.path.parent / name).resolve()))
         study = Study(config, path, workers=self.workers, progress=self.progress)
         study.save()
         return study

@@ -7,19 +7,18 @@ from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..effect import ACTS_ON, Effect
 from ..errors import InputError
-from ..material import Material
-from ..motion import Motion
 from ..obstacles import Table
 from ..parameters import Parameter
 from ..rollout import rollout
-from ..scenario import STANDARD_GRAVITY
-from ..simulator import Simulator, State
+from ..simulator import CAPABILITIES, Simulator
+from . import hooks
 from .checks import Check, check_leaves_random_state, check_pickles, must, must_raise, raise_failures
+from .hooks import strongest, table_under
 from .reference import ReferenceSimulator
-from .samples import KINDS, sample_material, sample_scenario, sample_scene
+from .samples import KINDS, sample_grasp, sample_material, sample_scenario, sample_scene
 
 #: A millionth of the range of every coefficient must not move anything by more than this [m].
 FADED = 1e-4
@@ -39,12 +38,20 @@ def check_effect(effect: type[Effect], simulator: Simulator | None = None) -> No
 
 
 def effect_checks(effect: type[Effect], simulator: Simulator | None = None) -> list[Check]:
-    """The checks of :func:`check_effect`, one a promise and kind of body."""
+    """The checks of :func:`check_effect`, one a promise and kind of body.
+
+    Those that need rollouts are left out on a simulator that cannot do what the effect needs.
+    """
     engine = simulator or ReferenceSimulator()
     checks = [Check(title, partial(check, effect)) for title, check in _ONCE.items()]
     for kind in (k for k in KINDS if k in effect.object_kinds and k in engine.object_kinds):
-        for title, look in _PER_KIND.items():
-            checks.append(Check(f"{kind}: {title}", partial(look, effect, engine, kind)))
+        for title, look in _HOOKS.items():
+            checks.append(Check(f"{kind}: {title}", partial(look, effect, kind)))
+        if effect.dissipative:
+            checks.append(Check(f"{kind}: never adds energy", partial(hooks.check_dissipative, effect, kind)))
+        if not effect.needs - engine.capabilities:
+            for title, run in _ROLLOUTS.items():
+                checks.append(Check(f"{kind}: {title}", partial(run, effect, engine, kind)))
     return checks
 
 
@@ -54,6 +61,8 @@ def check_declares(effect: type[Effect]) -> None:
     must(re.fullmatch(r"[a-z][a-z0-9-]*", effect.name), f"name {effect.name!r} must be lower-case words and hyphens")
     must(effect.acts_on in ACTS_ON, f"acts_on is {effect.acts_on!r}, but must be one of {', '.join(ACTS_ON)}")
     must(effect.object_kinds and set(effect.object_kinds) <= set(KINDS), f"object_kinds must be some of {KINDS}")
+    unknown = set(effect.needs) - set(CAPABILITIES)
+    must(not unknown, f"needs must be some of {tuple(CAPABILITIES)}, not {sorted(unknown)}")
     must(effect.coefficients, "it declares no coefficients; without one it cannot be off")
     names = [c.name for c in effect.coefficients]
     must(len(set(names)) == len(names), f"a coefficient is declared twice: {names}")
@@ -79,7 +88,7 @@ def check_unknown_refused(effect: type[Effect]) -> None:
 
 def check_pickled(effect: type[Effect]) -> None:
     """Class and values survive pickle."""
-    one = effect(**_strong(effect))
+    one = effect(**strongest(effect))
     copy = check_pickles(one, "the effect")
     must(type(copy) is effect and copy.values == one.values, "a pickled copy has other values")
 
@@ -93,62 +102,23 @@ def check_zero(effect: type[Effect], simulator: Simulator, kind: str) -> None:
 
 def check_fades(effect: type[Effect], simulator: Simulator, kind: str) -> None:
     """Coefficients near zero are nearly off: nothing jumps where the effect is switched on."""
-    weak = effect(**{name: 1e-6 * value for name, value in _strong(effect).items()})
+    weak = effect(**{name: 1e-6 * value for name, value in strongest(effect).items()})
     apart = np.abs(_path(simulator, kind) - _path(simulator, kind, weak)).max()
     must(apart < FADED, f"a millionth of its range moves a vertex by {apart:.2g} m, so zero is not its limit")
 
 
 def check_acts(effect: type[Effect], simulator: Simulator, kind: str) -> None:
     """At the ends of its ranges it does something, the same every time, also with one instance twice."""
-    one = effect(**_strong(effect))
+    one = effect(**strongest(effect))
     first = _path(simulator, kind, one)
     must(np.isfinite(first).all(), "the trajectory is not finite")
     must(not np.array_equal(first, _path(simulator, kind)), f"with {one.values} the trajectory is the plain one")
     must(np.array_equal(first, _path(simulator, kind, one)), "a second rollout of the same instance differs")
 
 
-def check_hooks(effect: type[Effect], simulator: Simulator, kind: str) -> None:
-    """Every hook returns what its signature says, and leaves its arguments alone."""
-    one = effect(**_strong(effect))
-    material = sample_material(kind)
-    changed: Material = one.on_material(material)
-    must(type(changed) is type(material), f"on_material makes a {type(changed).__name__} of a {material.kind} material")
-    gravity = _frozen(np.array([0.0, 0.0, -STANDARD_GRAVITY]))
-    turned = np.asarray(one.on_gravity(gravity))
-    must(turned.shape == (3,) and np.isfinite(turned).all(), f"on_gravity gives {turned}, not three finite numbers")
-    told = sample_scenario(kind).motion
-    made = one.on_command(told, 0.005)
-    must(isinstance(made, Motion), f"on_command gives a {type(made).__name__}, not a Motion")
-    must(made.grippers == told.grippers, f"on_command gives {made.grippers} grippers for {told.grippers}")
-    must(np.isfinite(made.poses).all(), "on_command gives a pose that is not finite")
-    still = one.on_command(Motion.still(), 0.005)
-    must(still.grippers == 1, "on_command cannot handle a motion of a single pose")
-
-
-def check_force(effect: type[Effect], simulator: Simulator, kind: str) -> None:
-    """A nodal force is finite, one row a vertex, and its arguments stay as they were."""
-    scene = sample_scene(kind)
-    masses = scene.body.vertex_measures * scene.material.density
-    force = effect(**_strong(effect)).bind(scene, _frozen(masses))
-    must(force is not None or effect.acts_on != "force", "acts_on is 'force', but bind() gives None")
-    if force is None:
-        return
-    rng = np.random.default_rng(0)
-    at_rest = np.zeros_like(scene.body.vertices)
-    for k, velocities in enumerate((at_rest, rng.normal(0, 1, at_rest.shape), rng.normal(0, 10, at_rest.shape))):
-        positions = scene.body.vertices + 0.01 * rng.normal(0, 1, at_rest.shape)
-        try:
-            got = np.asarray(force(0.01 * k, State(_frozen(positions), _frozen(velocities))))
-        except ValueError as error:
-            must("read-only" not in str(error), "the force writes into the positions or velocities it is given")
-            raise
-        must(got.shape == at_rest.shape, f"the force has shape {got.shape}, not {at_rest.shape}")
-        must(np.isfinite(got).all(), f"the force is not finite at velocities up to {np.abs(velocities).max():.2g} m/s")
-
-
 def check_random_state(effect: type[Effect], simulator: Simulator, kind: str) -> None:
     """The global random generators are left alone."""
-    check_leaves_random_state(lambda: _path(simulator, kind, effect(**_strong(effect))))
+    check_leaves_random_state(lambda: _path(simulator, kind, effect(**strongest(effect))))
 
 
 _ONCE: dict[str, Callable[[type[Effect]], None]] = {
@@ -158,28 +128,30 @@ _ONCE: dict[str, Callable[[type[Effect]], None]] = {
     "survives pickle": check_pickled,
 }
 
-_PER_KIND: dict[str, Callable[[type[Effect], Simulator, str], None]] = {
+#: What needs no rollout: with the effect and a kind of body.
+_HOOKS: dict[str, Callable[[type[Effect], str], None]] = {
+    "hooks return what they promise": hooks.check_hooks,
+    "what it binds is well-formed": hooks.check_force,
+}
+
+#: What is tried in rollouts: with the simulator, too.
+_ROLLOUTS: dict[str, Callable[[type[Effect], Simulator, str], None]] = {
     "zero is exactly off": check_zero,
     "fades out towards zero": check_fades,
     "acts, and repeats": check_acts,
-    "hooks return what they promise": check_hooks,
-    "its force is well-formed": check_force,
     "global random state untouched": check_random_state,
 }
 
 
-def _strong(effect: type[Effect]) -> dict[str, float]:
-    """Every coefficient at the end of its range that is further from zero."""
-    return {c.name: c.high if abs(c.high) >= abs(c.low) else c.low for c in effect.coefficients}
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    array.flags.writeable = False
-    return array
+def _grasp(kind: str) -> tuple[IntArray, ...]:
+    """A solid is held by its upper side, or nothing that is free would touch the table."""
+    body = sample_scene(kind).body
+    return (np.argsort(body.vertices[:, 2])[-9:] if kind == "solid" else sample_grasp(body),)
 
 
 def _path(simulator: Simulator, kind: str, *effects: Effect) -> FloatArray:
-    """What is seen of the carried object, whose lowest part touches a table."""
-    scenario = sample_scenario(kind)
-    table = Table(float(scenario.start_vertices()[:, 2].min()) - 0.002)
+    """What is seen of the carried object, whose lowest part sags onto a table."""
+    scenario = replace(sample_scenario(kind), grasps=_grasp(kind))
+    lowest = float(scenario.start_vertices()[:, 2].min()) - float(scenario.body.vertices[:, 2].min())
+    table = Table(table_under(kind).height + lowest)
     return rollout(simulator, replace(scenario, obstacles=(table,)), sample_material(kind), effects).series.points

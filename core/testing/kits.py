@@ -7,6 +7,7 @@ from typing import Any
 from .checks import Check, run_all
 from .effects import effect_checks
 from .extractors import extractor_checks
+from .renderers import renderer_checks
 from .simulators import simulator_checks
 
 
@@ -21,6 +22,7 @@ KITS: dict[str, Callable[[Any], list[Check]]] = {
     "simulator": simulator_checks,
     "extractor": extractor_checks,
     "effect": effect_checks,
+    "renderer": renderer_checks,
 }
 if find_spec("muslin.core.testing.estimators") is not None:
     KITS["estimator"] = _estimator_checks

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..body import Body, cloth_grid, rope_line, solid_box
-from ..material import ClothMaterial, Material, RopeMaterial, SolidMaterial
+from ..material import ClothMaterial, Material, RopeMaterial, SolidMaterial, with_fields
 from ..motion import Motion
 from ..obstacles import Obstacle
 from ..scenario import STANDARD_GRAVITY, Scenario
@@ -23,6 +23,11 @@ def sample_body(kind: str) -> Body:
         body = rope_line(np.array([[0.0, 0.0, 0.0], [0.09, 0.12, 0.0]]), 6)
     else:
         body = solid_box(np.zeros(3), np.full(3, 0.06), (3, 3, 3))
+    return tilted(body)
+
+
+def tilted(body: Body) -> Body:
+    """``body`` turned by 0.3 rad about x, and lifted by 1 m."""
     cos, sin = np.cos(0.3), np.sin(0.3)
     tilt = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]])
     return replace(body, vertices=body.vertices @ tilt.T + np.array([0.0, 0.0, 1.0]))
@@ -53,6 +58,7 @@ def sample_scene(
     gravity: FloatArray | None = None,
     obstacles: tuple[Obstacle, ...] = (),
     load: float = 0.0,
+    **fields: float,
 ) -> Scene:
     """A scene at rest.
 
@@ -62,13 +68,14 @@ def sample_scene(
         gravity: ``(3,)`` [m/s2]; default straight down.
         obstacles: what stands around it.
         load: mass hung on the last vertex [kg].
+        fields: of the material.
     """
     body = sample_body(kind)
     loads = np.zeros(len(body.vertices))
     loads[-1] = load
     down = np.array([0.0, 0.0, -STANDARD_GRAVITY]) if gravity is None else gravity
     grasps = (sample_grasp(body),) if held else ()
-    return Scene(body, sample_material(kind), down, grasps, loads, obstacles)
+    return Scene(body, with_fields(sample_material(kind), fields), down, grasps, loads, obstacles)
 
 
 def sample_scenario(kind: str, duration: float = 0.3, obstacles: tuple[Obstacle, ...] = ()) -> Scenario:

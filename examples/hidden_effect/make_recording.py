@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from muslin.core.measurement_store import save_measurement
-from muslin.core.synthetic import STRENGTHS, hidden_effect
+from muslin.core.synthetic import FIRST_EFFECTS, hidden_effect
 
 
 def main() -> None:
@@ -19,7 +19,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=2026, help="draws effect, coefficients, material and noise")
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).with_name("recording.zarr"))
     arguments = parser.parse_args()
-    effect = str(np.random.default_rng([arguments.seed, 6]).choice(sorted(STRENGTHS)))
+    effect = str(np.random.default_rng([arguments.seed, 6]).choice(FIRST_EFFECTS))
     measurement, hidden = hidden_effect(effect, arguments.seed)
     save_measurement(measurement, arguments.output, hidden=hidden, overwrite=True)
     print(f"wrote {arguments.output}: {', '.join(measurement.names)}")

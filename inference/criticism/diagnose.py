@@ -9,6 +9,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.errors import BrokenPluginError, InputError
 from ...core.parameters import ParameterSpace
+from ...core.powerless import why_powerless
 from ...core.registry import REGISTRY
 from ...core.rollout import Trajectory
 from ...core.store import put, read, storage_errors
@@ -92,13 +93,14 @@ def diagnose(study: Study) -> Diagnosis:
 
 
 def candidate_names(study: Study) -> list[str]:
-    """The effects to try: those of the study file, or all installed ones that fit the object and are not in yet.
+    """The effects to try: those of the study file, or all installed ones that can act here and are not in yet.
 
     Raises:
-        InputError: none is left.
+        InputError: none is left, or one that the study names cannot act.
         UnknownPluginError, BrokenPluginError: for one that the study names.
     """
-    kind = study.problem.material.kind
+    problem = study.problem
+    scenario = problem.scenarios[problem.fit_on[0]]
     told = study.config.diagnose.candidates
     names = told if told is not None else REGISTRY.names("effect")
     out = []
@@ -110,7 +112,10 @@ def candidate_names(study: Study) -> list[str]:
                 raise
             study.progress(f"left out: {error}", 0, 0)
             continue
-        if name not in study.config.effects and kind in effect.object_kinds:
+        reason = why_powerless(effect, problem.simulator, scenario)
+        if told is not None and reason is not None:
+            raise InputError(f"[diagnose.candidates]: {reason}")
+        if name not in study.config.effects and reason is None:
             out.append(name)
     if not out:
         raise InputError(f"{study.path}: no candidate effect is left to try; see: muslin plugins")

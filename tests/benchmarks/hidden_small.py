@@ -1,4 +1,4 @@
-"""Is the missing effect named? Each of the six built-in effects once, and none: MuJoCo data, MuJoCo as the model.
+"""Is the missing effect named? Each of six built-in effects once, and none: MuJoCo data, MuJoCo as the model.
 
 A 0.3 m cloth of 9 x 9 vertices with 25 markers and 3 mm noise; fitted on a fling and a swing, held out
 on a wider fling. Material, coefficients and noise are drawn from the seed of the case::
@@ -15,7 +15,7 @@ from table import Row, report
 
 from muslin.core.measurement_store import save_measurement
 from muslin.core.study import Study, read_config, write_config
-from muslin.core.synthetic import STRENGTHS, hidden_effect
+from muslin.core.synthetic import FIRST_EFFECTS, hidden_effect
 
 STUDY = Path(__file__).resolve().parents[2] / "examples/hidden_effect/study.toml"
 FIRST_SEED = 100
@@ -43,7 +43,7 @@ def main() -> None:
     arguments = parser.parse_args()
     rows: list[Row] = []
     began, right, false_names, total = time.monotonic(), 0, 0, 0
-    cases: list[str | None] = [None, *sorted(STRENGTHS)]
+    cases: list[str | None] = [None, *FIRST_EFFECTS]
     for k, effect in enumerate(cases):
         name = effect or "none"
         if arguments.only is not None and name not in arguments.only:

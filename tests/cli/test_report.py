@@ -68,6 +68,7 @@ def test_after_fit_only(tmp_path: Path) -> None:
     assert "has not been checked yet" in page.text
     assert "muslin compare cloth.toml" in page.text
     assert "at a bound of its prior" in page.text
+    assert "3 of 240 draws could not be simulated" in page.text
 
 
 def test_after_compare(tmp_path: Path) -> None:

@@ -2,31 +2,28 @@
 
 import random
 from collections.abc import Callable
-from typing import ClassVar
+from dataclasses import replace
+from functools import partial
+from typing import Any, ClassVar, cast
 
 import numpy as np
 import pytest
 
 from muslin.core.arrays import FloatArray
-from muslin.core.effect import Effect, NodalForce
 from muslin.core.extractor import KeypointExtractor
-from muslin.core.parameters import Parameter
+from muslin.core.material import with_fields
 from muslin.core.registry import REGISTRY
 from muslin.core.scene import Scene
 from muslin.core.series import PointSeries
-from muslin.core.simulator import Simulator, State, World
-from muslin.core.testing import KITS, check_effect, check_extractor, check_simulator, run_checks
+from muslin.core.simulator import CAPABILITIES, Simulator, State, World
+from muslin.core.testing import KITS, check_extractor, check_simulator, run_checks
+from muslin.core.testing.checks import run_all
 from muslin.core.testing.reference import ReferenceSimulator, ReferenceWorld
-from muslin.core.testing.simulators import SideForce
+from muslin.core.testing.simulators import simulator_checks
 
 
 def test_the_reference_simulator_conforms() -> None:
     check_simulator(ReferenceSimulator)
-
-
-@pytest.mark.parametrize("name", REGISTRY.names("effect"))
-def test_every_installed_effect_conforms(name: str) -> None:
-    check_effect(REGISTRY.get("effect", name))
 
 
 @pytest.mark.parametrize("name", REGISTRY.names("extractor"))
@@ -37,44 +34,68 @@ def test_every_installed_extractor_conforms(name: str) -> None:
 class Faulty(ReferenceSimulator):
     """Breaks one promise, chosen by name."""
 
-    def __init__(self, fault: str = "") -> None:
+    def __init__(self, fault: str = "", time_step: float = 0.005) -> None:
+        super().__init__(time_step)
         self.fault = fault
+        if fault == "nameless engine":
+            self.engine_version = lambda: ""  # type: ignore[method-assign]
 
     def open(self, scene: Scene) -> World:
-        return FaultyWorld(scene, self.fault)
+        if self.fault == "anisotropy":
+            scene = replace(scene, material=with_fields(cast(Any, scene.material), {"weft_stretch_ratio": 1.0}))
+        if self.fault == "rest is start" and scene.start is not None:
+            scene = replace(scene, body=replace(scene.body, vertices=scene.start))
+        return FaultyWorld(scene, self.fault, self.time_step)
 
 
 class FaultyWorld(ReferenceWorld):
-    def __init__(self, scene: Scene, fault: str) -> None:
-        super().__init__(scene)
+    def __init__(self, scene: Scene, fault: str, time_step: float) -> None:
+        super().__init__(scene, time_step)
         self.fault = fault
         self.last: FloatArray | None = None
+        self.shape = scene.body.vertices
         if fault == "gravity":
             self._gravity = self._gravity * 1.02
         if fault == "masses":
             self.masses = self.masses * 1.1
         if fault == "start":
             self._x = self._x[::-1].copy()
+        if fault == "stiffness":
+            self._elasticity = 1.1 * self._elasticity
+        if fault == "straight rest":
+            self._gravity = self._gravity + np.array([0.0, 0.3, 0.3])
+        if fault == "friction of one":
+            self._obstacles = [(o, friction / o.friction) for o, friction in self._obstacles]
+        if fault == "no friction":
+            self._obstacles = [(o, 0.0) for o, _ in self._obstacles]
+        if fault == "no obstacle":
+            self._obstacles = []
 
-    def step(self, held: FloatArray, forces: FloatArray | None) -> None:
+    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
         if self.fault == "force lingers":
             forces = self.last if forces is None else forces
             self.last = forces
         if self.fault == "force lost":
             forces = None
+        if self.fault == "half balance" and forces is not None and self._gravity.any():
+            forces = 0.99 * forces
         if self.fault == "global random":
             np.random.random()  # noqa: NPY002
         if self.fault == "python random":
             random.random()
         if self.fault == "not repeatable":
             self._v = self._v + np.random.default_rng().normal(0, 1e-9, self._v.shape)
-        if self.fault == "no table":
-            self._table = None
-        super().step(held, forces)
+        if self.fault == "damping a step":
+            self._v = 0.97 * self._v
+        if self.fault == "stiffness of all" and stiffness is not None:
+            stiffness = np.full_like(stiffness, stiffness.mean())
+        super().step(held, forces, stiffness)
         if self.fault == "held" and len(held):
             self._x[self._held] += 1e-6
         if self.fault == "nan":
             self._x[-1] = np.nan
+        if self.fault == "contact forces a step":
+            self._contacts = self._contacts * self.time_step
 
     def state(self) -> State:
         if self.fault == "shape":
@@ -82,30 +103,73 @@ class FaultyWorld(ReferenceWorld):
         return super().state()
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ("gravity", "free fall"),
-        ("masses", "add up to"),
-        ("start", "from where the scene has it"),
-        ("force lingers", "after the force has ended"),
-        ("force lost", "nodal forces accelerate"),
-        ("global random", "NumPy's global random"),
-        ("python random", "Python's global random"),
-        ("not repeatable", "second rollout differs"),
-        ("no table", "below the table"),
-        ("held", "it must be exact"),
-        ("nan", "not finite"),
-        ("shape", "have shape"),
-    ],
-)
-def test_the_kit_catches_a_faulty_simulator(fault: str, words: str) -> None:
-    with pytest.raises(AssertionError, match=words):
-        check_simulator(lambda: Faulty(fault))
+#: Title of a check without the kind -> faults, each with words of the complaint.
+FAULTS: dict[str, dict[str, str]] = {
+    "starts as the scene says": {
+        "masses": "add up to",
+        "start": "from where the scene has it",
+        "shape": "have shape",
+    },
+    "held vertices are exact": {"held": "it must be exact", "nan": "not finite"},
+    "free fall": {"gravity": "off a t"},
+    "nodal forces accelerate": {"force lost": "off a t"},
+    "nodal forces balance gravity": {"half balance": "off a t"},
+    "a force ends with its step": {"force lingers": "after the force has ended"},
+    "stretches as its stiffness says": {"stiffness": "times as much"},
+    "refines with the time step": {"damping a step": "half of it still"},
+    "repeats bit for bit": {"not repeatable": "second rollout differs"},
+    "an effect at zero changes nothing": {"force lost": "moves nothing", "not repeatable": "changes it"},
+    "global random state untouched": {"global random": "NumPy's global", "python random": "Python's global"},
+    **{
+        title: faults
+        for name in ("table", "cylinder", "static-mesh")
+        for title, faults in {
+            f"a {name} carries it at its surface": {"no obstacle": f"mm above the {name}"},
+            f"sticks to a {name} on a gentle slope": {"no friction": "it slides"},
+            f"slides down a {name} on a steep one": {"friction of one": "it gains 5."},
+        }.items()
+    },
+    "contact forces change its momentum": {"contact forces a step": "miss 9"},
+    "is stiffer along the weft if told so": {"anisotropy": "along the warp as without"},
+    "keeps a curved rest shape": {"straight rest": "without any force"},
+    "starts away from its rest shape": {"rest is start": "off its rest length"},
+    "changes its stiffness when told": {"stiffness of all": "near the grasp"},
+}
+
+
+def complaints(make: Callable[..., Simulator], title: str) -> dict[str, str | None]:
+    """Complaint by kind of body of the checks of that title."""
+    checks = [c for c in simulator_checks(make) if c.title.partition(": ")[2] == title]
+    return {name.partition(":")[0]: complaint for name, complaint in run_all(checks)}
+
+
+@pytest.mark.parametrize(("title", "fault"), [(t, f) for t, faults in FAULTS.items() for f in faults])
+def test_each_check_catches_a_simulator_broken_in_just_that_way(title: str, fault: str) -> None:
+    found = complaints(partial(Faulty, fault), title)
+    assert found
+    for complaint in found.values():
+        assert complaint is not None
+        assert FAULTS[title][fault] in complaint
+
+
+def test_no_check_of_the_kit_goes_without_a_fault_that_it_catches() -> None:
+    """Others are: what it declares, refusals, and torsion, each with a test below."""
+    titles = {c.title.partition(": ")[2] or c.title for c in simulator_checks(ReferenceSimulator)}
+    assert titles - {"declares its name, kinds and engine version"} == set(FAULTS)
+
+
+def test_a_simulator_that_does_not_say_what_it_is() -> None:
+    with pytest.raises(AssertionError, match=r"engine_version\(\) must name"):
+        simulator_checks(partial(Faulty, "nameless engine"))[0].run()
+    with pytest.raises(AssertionError, match="capabilities must be some of"):
+        simulator_checks(type("Flies", (ReferenceSimulator,), {"capabilities": frozenset({"fly"})}))[0].run()
 
 
 class ClothOnly(ReferenceSimulator):
+    """Can do nothing but plain cloth, and says so."""
+
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth"})
+    capabilities: ClassVar[frozenset[str]] = frozenset()
 
 
 class TakesAll(ClothOnly):
@@ -113,103 +177,37 @@ class TakesAll(ClothOnly):
         return None
 
 
-def test_kinds_that_are_not_claimed_must_be_refused() -> None:
+def test_what_is_not_claimed_must_be_refused() -> None:
     check_simulator(ClothOnly)
-    with pytest.raises(AssertionError, match="lets a solid pass"):
-        check_simulator(TakesAll)
+    refusals = [c for c in simulator_checks(TakesAll) if "refused" in c.title]
+    told = dict(run_all(refusals))
+    assert told["solid: refused, as it is not claimed"] == "check() lets a solid pass, which is not in object_kinds"
+    needs = ("table", "cylinder", "static-mesh", "anisotropy", "curved-rest", "start-shape")
+    assert len(told) == 2 + len(needs)
+    for need in needs:
+        complaint = told[f"cloth: refused where it needs {need!r}, which is not claimed"]
+        assert complaint == f"check() lets a scene pass that needs {need!r}, which is not in capabilities"
+
+
+class Untwisted(ReferenceSimulator):
+    """Claims a torsion that it does not have."""
+
+    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES)
+
+
+def test_torsion_that_is_only_claimed_is_caught() -> None:
+    complaint = complaints(Untwisted, "resists torsion")["rope"]
+    assert complaint is not None
+    assert "of a quarter of the twist rigidity gives way 1.00 times as much, not 1.94" in complaint
 
 
 def test_a_simulator_that_cannot_travel() -> None:
     class Local(ReferenceSimulator):
         pass
 
-    with pytest.raises(AssertionError, match="cannot be pickled"):
-        check_simulator(Local)
-
-
-class Jumps(SideForce):
-    """Does not fade out towards zero."""
-
-    name: ClassVar[str] = "jumps"
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        pull = 5.0 * masses[:, None] * np.array([1.0, 0.0, 0.0])
-        return lambda time, positions, velocities: pull
-
-
-class NeverOff(SideForce):
-    name: ClassVar[str] = "never-off"
-
-    @property
-    def is_off(self) -> bool:
-        return False
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        pull = (1.0 + self.values["acceleration"]) * masses[:, None] * np.array([1.0, 0.0, 0.0])
-        return lambda time, positions, velocities: pull
-
-
-class WrongShape(SideForce):
-    name: ClassVar[str] = "wrong-shape"
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        return lambda time, positions, velocities: np.zeros(3)
-
-
-class Writes(SideForce):
-    name: ClassVar[str] = "writes"
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        def force(time: float, positions: FloatArray, velocities: FloatArray) -> FloatArray:
-            velocities *= self.values["acceleration"] * masses[:, None]
-            return velocities
-
-        return force
-
-
-class Inert(SideForce):
-    name: ClassVar[str] = "inert"
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:
-        return None
-
-
-class NoZero(SideForce):
-    name: ClassVar[str] = "no-zero"
-    coefficients: ClassVar[tuple[Parameter, ...]] = (Parameter("acceleration", "m/s2", 1.0, 5.0),)
-
-
-class Swallows(SideForce):
-    name: ClassVar[str] = "swallows"
-
-    def __init__(self, **values: float) -> None:
-        super().__init__(**{k: v for k, v in values.items() if k == "acceleration"})
-
-
-class Twice(SideForce):
-    name: ClassVar[str] = "twice"
-    coefficients: ClassVar[tuple[Parameter, ...]] = (Parameter("acceleration", "m/s2", 0.0, 5.0),) * 2
-
-
-@pytest.mark.parametrize(
-    ("effect", "words"),
-    [
-        (Jumps, "zero is not its limit"),
-        (NeverOff, "without values it is not off"),
-        (NeverOff, "differs from the one without"),
-        (WrongShape, "shape"),
-        (Writes, "writes into"),
-        (Inert, "the trajectory is the plain one"),
-        (Inert, "bind.. gives None"),
-        (NoZero, "leaves zero out"),
-        (Swallows, "accepts a coefficient"),
-        (Twice, "declared twice"),
-    ],
-)
-def test_the_kit_catches_a_faulty_effect(effect: type[Effect], words: str) -> None:
-    check_effect(SideForce)
-    with pytest.raises(AssertionError, match=words):
-        check_effect(effect)
+    complaint = complaints(Local, "repeats bit for bit")["rope"]
+    assert complaint is not None
+    assert "cannot be pickled" in complaint
 
 
 class MakesUp(KeypointExtractor):
@@ -227,9 +225,9 @@ def test_the_kit_catches_a_faulty_extractor() -> None:
 
 
 def test_the_runner_names_every_check_and_never_raises() -> None:
-    rows = list(run_checks("simulator", lambda: Faulty("held")))
-    assert [t for t, error in rows if error] == ["cloth: held vertices are exact", "solid: held vertices are exact"]
-    assert len(rows) > 15
+    rows = list(run_checks("extractor", MakesUp))
+    assert [t for t, error in rows if error]
+    assert len(rows) > 3
     unbuildable: Callable[[], Simulator] = lambda: 1 / 0  # type: ignore[return-value]  # noqa: E731
     [(title, error)] = run_checks("simulator", unbuildable)
     assert title == "can be built without options"

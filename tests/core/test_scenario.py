@@ -6,8 +6,7 @@ import pytest
 from muslin.core.errors import InputError
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
-from muslin.core.scenario import Scenario, bound_markers, marker_weights
-from muslin.core.scenarios import PRESETS, preset
+from muslin.core.scenario import bound_markers, marker_weights
 from muslin.core.series import PointSeries
 from muslin.core.testing.samples import sample_body, sample_scenario
 
@@ -48,7 +47,7 @@ def test_held_vertices_follow_a_turning_gripper() -> None:
     motion = Motion(np.array([0.0, 1.0]), poses)
     vertices = scenario.world_vertices()
     held = replace(scenario, motion=motion).held_positions(np.array([0.0, 1.0]), vertices)
-    start = vertices[scenario.held]
+    start = vertices[scenario.grasps[0]]
     np.testing.assert_allclose(held[0], start, atol=1e-12)
     turned = np.stack([-start[:, 1] + 0.1, start[:, 0], start[:, 2]], axis=1)
     np.testing.assert_allclose(held[1], turned, atol=1e-12)
@@ -67,22 +66,3 @@ def test_a_marker_off_a_flat_sheet_cannot_be_bound() -> None:
     body = sample_body("cloth")
     with pytest.raises(InputError, match="lie in one plane"):
         bound_markers(body.vertices, body.vertices[:1] + np.array([0.0, 0.01, 0.05]))
-
-
-@pytest.mark.parametrize("name", PRESETS)
-def test_presets_stand_on_their_own(name: str) -> None:
-    p = preset(name)
-    body, motion = p.body(), p.motion()
-    scenario = Scenario(
-        name, body, p.grasps(body), motion, np.array([0.0, 1.0]), np.eye(len(body.vertices)), p.load_vertices(body)
-    )
-    assert body.kind == p.kind
-    held = replace(scenario, motion=motion).held_positions(np.array([0.0]), scenario.world_vertices())
-    np.testing.assert_allclose(held[0], scenario.world_vertices()[scenario.held], atol=1e-12)
-
-
-def test_unknown_scenario_names_the_nearest() -> None:
-    with pytest.raises(InputError, match="Did you mean 'swing'"):
-        preset("swnig")
-    with pytest.raises(InputError, match="2 positive sizes"):
-        preset("fling").body([0.3], [9, 9])

@@ -11,4 +11,4 @@ from muslin.core.study import Study
 @pytest.fixture
 def small_study(tmp_path: Path) -> Study:
     pytest.importorskip("mujoco")
-    return Study.load(write_study(tmp_path, small_measurement()), workers=1)
+    return Study.load(write_study(tmp_path, small_measurement()), workers=0)

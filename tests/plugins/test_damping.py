@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from effect_objects import BLOCK, SHEET, G, bound, engine, moving, vertices
+from effect_objects import BLOCK, SHEET, G, bound, engine, moving, scene_of, vertices
 
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.material import ClothMaterial, SolidMaterial
-from muslin.core.scene import Scene
 from muslin.plugins.effects.damping import InternalDamping, ViscousDamping
 
 BODIES = [pytest.param(SHEET, ClothMaterial(), id="cloth"), pytest.param(BLOCK, SolidMaterial(), id="solid")]
@@ -23,7 +22,7 @@ def test_viscous_force_is_minus_alpha_m_v():
 def test_a_free_body_slows_down_exponentially(name, body, material):
     """v = v0 exp(-alpha t) after a push, to alpha^2 t h / 2 of explicit steps; no gravity."""
     rate, effect = 3.0, ViscousDamping(rate=3.0)
-    scene = Scene(body, material, np.zeros(3), np.zeros(0, np.int64), np.zeros(len(body.vertices)))
+    scene = scene_of(body, material, np.zeros(3))
     world = engine(name, time_step=0.002).open(scene)
     try:
         start = np.array([0.4, 0.3, -0.2])
@@ -31,8 +30,7 @@ def test_a_free_body_slows_down_exponentially(name, body, material):
         force = effect.bind(scene, world.masses)
         assert world.state().velocities == pytest.approx(moving(body, start), rel=1e-6)
         for k in range(200):
-            state = world.state()
-            world.step(np.zeros((0, 3)), force(0.002 * k, state.positions, state.velocities))
+            world.step(np.zeros((0, 3)), force(0.002 * k, world.state()))
         expected = moving(body, start * np.exp(-rate * 0.4))
         np.testing.assert_allclose(world.state().velocities, expected, rtol=0.5 * rate**2 * 0.4 * 0.002 * 1.1)
         np.testing.assert_allclose(world.state().velocities, moving(body, start * (1 - rate * 0.002) ** 200), rtol=1e-5)

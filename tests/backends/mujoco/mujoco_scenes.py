@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from muslin.backends.mujoco import MujocoSimulator
-from muslin.core.body import Body, cloth_grid, solid_box
-from muslin.core.material import Material, SolidMaterial
+from muslin.core.body import Body, cloth_grid, rope_line, solid_box
+from muslin.core.material import ClothMaterial, Material, RopeMaterial, SolidMaterial
 from muslin.core.scene import Scene
 from muslin.core.simulator import World
 
@@ -18,6 +19,17 @@ NONE_HELD = np.zeros(0, dtype=np.int64)
 NOWHERE = np.zeros((0, 3))
 SMALL_CLOTH = cloth_grid(0.2, 0.2, 4, 4)
 SMALL_SOLID = solid_box(np.zeros(3), np.array([0.04, 0.03, 0.03]), (3, 3, 3))
+
+SMALL_ROPE = rope_line(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), 6)
+OBJECTS: dict[str, tuple[Body, Material]] = {
+    "cloth": (SMALL_CLOTH, ClothMaterial()),
+    "rope": (SMALL_ROPE, RopeMaterial()),
+    "solid": (SMALL_SOLID, SolidMaterial()),
+}
+
+#: Sag over length of a heavy elastica (a clamped strip that hangs over freely) with w L^3 / B = 7.35, where w is the
+#: weight per length and B the bending rigidity: from its boundary value problem.
+HEAVY_ELASTICA, HEAVY_SAG = 7.35, 0.616
 
 # The beam of the demo: 0.1 x 0.03 x 0.03 m of silicone.
 E, NU, L, H, RHO = 264e3, 0.3, 0.1, 0.03, 1070.0
@@ -49,6 +61,31 @@ def run(world: World, seconds: float, held: Any = NOWHERE, forces: Any = None, b
             total = -brake * world.masses[:, None] * world.state().velocities + (0.0 if forces is None else forces)
         world.step(held, total)
     return world.state().positions
+
+
+def strip(cells: int, width: float, length: float = 0.1) -> Body:
+    """A level strip along x, square cells, with one more cell behind x = 0 to be held there."""
+    cell = length / cells
+    columns = round(width / cell) + 1
+    sheet = cloth_grid((columns - 1) * cell, length + cell, columns, cells + 2)
+    x, y = -sheet.vertices[:, 2] - cell, sheet.vertices[:, 0]
+    return Body("cloth", np.stack([x, y, 0 * x], axis=1), sheet.elements, sheet.grid, sheet.warp)
+
+
+def along_warp(body: Body, direction: Any) -> Body:
+    """The same mesh with its warp along ``direction`` at rest."""
+    corners = body.vertices[body.elements]
+    edges = corners[:, 1:] - corners[:, :1]
+    shares = np.einsum("xei,x->ei", np.linalg.pinv(edges).transpose(1, 0, 2), np.asarray(direction, float))
+    return replace(body, warp=shares)
+
+
+def droop(body: Body, material: Material, length: float = 0.1, gravity: float = G, seconds: float = 1.2) -> float:
+    """Mean sag of the end at x = ``length`` over ``length`` after the part behind x = 0 was clamped level."""
+    held = np.flatnonzero(body.vertices[:, 0] < 1e-9)
+    tip = np.flatnonzero(body.vertices[:, 0] > length - 1e-9)
+    with opened(scene(body, material, held=held, gravity=np.array([0.0, 0.0, -gravity]))) as world:
+        return float(-run(world, seconds, body.vertices[held], brake=8.0)[tip, 2].mean() / length)
 
 
 def beam_sag(

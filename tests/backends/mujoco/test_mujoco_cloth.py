@@ -7,26 +7,8 @@ pytest.importorskip("mujoco")
 
 from mujoco_scenes import G, opened, run, scene, swing
 
-from muslin.backends.mujoco.model import shell_thickness
 from muslin.core.body import Body, cloth_grid
 from muslin.core.material import ClothMaterial
-
-
-@pytest.mark.parametrize("bending_rigidity", [2e-6, 5e-4])
-@pytest.mark.parametrize("stretch_stiffness", [30.0, 3000.0])
-@pytest.mark.parametrize("poisson_ratio", [0.0, 0.3, 0.45])
-def test_thickness_and_modulus_give_back_the_material(bending_rigidity, stretch_stiffness, poisson_ratio):
-    """A plate of thickness t and modulus E has E t and D = E t^3 / (12 (1 - nu^2))."""
-    material = ClothMaterial(0.15, stretch_stiffness, bending_rigidity, poisson_ratio)
-    t = shell_thickness(material)
-    young = stretch_stiffness / t
-    assert young * t**3 / (12 * (1 - poisson_ratio**2)) == pytest.approx(bending_rigidity, rel=1e-12)
-
-
-def test_a_plate_of_known_thickness():
-    """1 mm of rubber, E = 1 MPa."""
-    rigidity = 1e6 * 1e-9 / (12 * (1 - 0.3**2))
-    assert shell_thickness(ClothMaterial(1.0, 1e3, rigidity, 0.3)) == pytest.approx(1e-3, rel=1e-12)
 
 
 @pytest.mark.parametrize("poisson", [0.1, 0.4])
@@ -46,28 +28,6 @@ def test_tensile_strip(poisson):
     # Saint Venant-Kirchhoff: force = E t w e (1 + e) (1 + e/2).
     assert stretch * (1 + stretch) * (1 + stretch / 2) == pytest.approx(strain, rel=0.015)
     assert narrowing / stretch == pytest.approx(poisson, rel=0.03)
-
-
-def _droop(rows: int) -> float:
-    """Tip sag [m] of a 0.1 m strip of 0.15 kg/m2 and 2e-4 N m between rows clamped one cell deep."""
-    cell = 0.1 / (rows - 1)
-    sheet = cloth_grid(2 * cell, 0.1 + cell, 3, rows + 1)
-    turned = np.stack([-sheet.vertices[:, 2] - cell, sheet.vertices[:, 0], np.zeros(len(sheet.vertices))], axis=1)
-    body = Body("cloth", turned, sheet.elements, sheet.grid)
-    held = np.flatnonzero(turned[:, 0] < 1e-9)
-    material = ClothMaterial(stretch_stiffness=20.0, bending_rigidity=2e-4, damping_time=1e-3)
-    with opened(scene(body, material, held=held)) as world:
-        return float(-run(world, 1.2, turned[held], brake=8.0)[-3:, 2].mean())
-
-
-def test_a_cantilever_droops_more_than_an_elastica():
-    """rho g L^3 / D = 7.35: 0.0616 m from the boundary value problem of the heavy elastica.
-
-    MuJoCo's bending on this mesh is too soft: 22 % more with 8 cells, 16 % with 16. It must not get worse.
-    """
-    ratios = [_droop(rows) / 0.0616 for rows in (9, 17)]
-    assert ratios == sorted(ratios, reverse=True)
-    assert 1.0 < ratios[1] < ratios[0] < 1.25
 
 
 def test_bending_rigidity_matters_and_zero_of_it_is_a_membrane():

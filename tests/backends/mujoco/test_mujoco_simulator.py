@@ -156,7 +156,7 @@ def test_is_silent_lazy_and_leaves_no_log(tmp_path):
         "assert 'mujoco' not in sys.modules\n"
         "from muslin.core.body import cloth_grid; from muslin.core.material import ClothMaterial\n"
         "from muslin.core.scene import Scene; from muslin.core.errors import RolloutFailed\n"
-        "s = Scene(cloth_grid(1, 1, 3, 3), ClothMaterial(), np.zeros(3), np.zeros(1, dtype=int), np.zeros(9), 0.0)\n"
+        "s = Scene(cloth_grid(1, 1, 3, 3), ClothMaterial(), np.zeros(3), (np.zeros(1, dtype=int),), np.zeros(9))\n"
         "w = b.MujocoSimulator().open(s); w.step(s.body.vertices[s.held], None)\n"
         "try:\n"
         "    w.step(s.body.vertices[s.held], np.full((9, 3), 1e12))\n"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from muslin.backends.pybullet import PybulletSimulator
-from muslin.core.body import Body, cloth_grid, solid_box
+from muslin.core.body import Body, cloth_grid, rope_line, solid_box
 from muslin.core.material import Material
 from muslin.core.scene import Scene
 from muslin.core.simulator import World
@@ -52,4 +52,5 @@ def flat(body: Body, height: float = 0.0) -> Body:
 
 
 SMALL_CLOTH = cloth_grid(0.2, 0.2, 5, 5)
+SMALL_ROPE = rope_line(np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), 9)
 SMALL_SOLID = solid_box(np.zeros(3), np.array([0.04, 0.03, 0.03]), (4, 3, 3))

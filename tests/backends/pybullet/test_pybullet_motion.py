@@ -9,13 +9,14 @@ import pytest
 
 pytest.importorskip("pybullet")
 
-from pybullet_scenes import GRAVITY, NOWHERE, SMALL_CLOTH, SMALL_SOLID, WEIGHTLESS, opened, run, scene
+from pybullet_scenes import GRAVITY, NOWHERE, SMALL_CLOTH, SMALL_ROPE, SMALL_SOLID, WEIGHTLESS, opened, run, scene
 
-from muslin.core.material import ClothMaterial, SolidMaterial
+from muslin.core.material import ClothMaterial, RopeMaterial, SolidMaterial
 from muslin.core.obstacles import Table
 
 BODIES = [
     pytest.param(SMALL_CLOTH, ClothMaterial(damping_time=1e-3), id="cloth"),
+    pytest.param(SMALL_ROPE, RopeMaterial(damping_time=1e-3), id="rope"),
     pytest.param(SMALL_SOLID, SolidMaterial(damping_time=1e-3), id="solid"),
 ]
 
@@ -37,7 +38,7 @@ def test_free_fall_in_any_direction(body, material, loaded):
     with opened(scene(body, material, gravity=gravity, loads=loads)) as world:
         fallen = run(world, 0.3) - body.vertices
         velocities = world.state().velocities
-        substep = world._dt
+        substep = world.time_step / world._substeps
     np.testing.assert_allclose(velocities, np.tile(gravity * 0.3, (len(fallen), 1)), rtol=1e-7, atol=1e-8)
     # Symplectic Euler falls half a substep's worth further than the parabola.
     np.testing.assert_allclose(

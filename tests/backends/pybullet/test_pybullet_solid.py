@@ -7,7 +7,7 @@ pytest.importorskip("pybullet")
 
 from pybullet_scenes import GRAVITY, NOWHERE, WEIGHTLESS, opened, run, scene
 
-from muslin.backends.pybullet.elements import Elements, volumetric
+from muslin.backends.pybullet.volume import Volume
 from muslin.core.body import Body, solid_box
 from muslin.core.material import SolidMaterial
 from muslin.core.obstacles import Table
@@ -22,52 +22,52 @@ def _beam(counts: tuple[int, int, int]) -> tuple[Body, np.ndarray, np.ndarray]:
     return body, np.flatnonzero(x < 1e-9), np.flatnonzero(x > L - 1e-9)
 
 
-def _linear_sag(body: Body, held: np.ndarray, loads: np.ndarray, gravity: np.ndarray = GRAVITY) -> np.ndarray:
-    """Displacements ``(V, 3)`` of the same tetrahedra by small-strain statics."""
-    elements = Elements(body, volumetric(E, NU))
-    matrix = elements.strain_matrix(body.vertices)
-    count = 3 * len(body.vertices)
-    columns = [elements.stiffness(matrix, unit.reshape(-1, 3)).ravel() for unit in np.eye(count)]
-    stiffness = np.stack(columns, axis=1)
-    free = np.ones(count, dtype=bool)
-    free[(3 * held[:, None] + np.arange(3)).ravel()] = False
-    weight = ((body.vertex_measures * RHO + loads)[:, None] * gravity).ravel()
-    out = np.zeros(count)
-    out[free] = np.linalg.solve(stiffness[np.ix_(free, free)], weight[free])
-    return out.reshape(-1, 3)
-
-
 def _timoshenko(load: float) -> float:
     bend, shear = 1 / (E * INERTIA), 1 / (5 / 6 * SHEAR * AREA)
     own = RHO * AREA * -GRAVITY[2]
     return own * L**4 * bend / 8 + own * L**2 * shear / 2 + load * -GRAVITY[2] * (L**3 * bend / 3 + L * shear)
 
 
-@pytest.mark.parametrize("load", [0.0, 0.02])
-def test_beam_sag(load):
-    """Equal to linear statics of its own mesh; against beam theory, coarse linear tetrahedra are too stiff."""
-    body, held, tip = _beam((7, 3, 3))
+def _sag(body: Body, held: np.ndarray, tip: np.ndarray, load: float = 0.0) -> float:
     loads = np.zeros(len(body.vertices))
     loads[tip] = load / len(tip)
     material = SolidMaterial(density=RHO, youngs_modulus=E, poisson_ratio=NU, damping_time=2e-3)
     with opened(scene(body, material, held=held, loads=loads)) as world:
-        moved = run(world, 0.4, body.vertices[held], brake=25.0) - body.vertices
-    sag = -moved[tip, 2].mean()
-    assert sag == pytest.approx(-_linear_sag(body, held, loads)[tip, 2].mean(), rel=0.02)
-    assert 0.4 * _timoshenko(load) < sag < _timoshenko(load)
+        moved = run(world, 0.3, body.vertices[held], brake=25.0) - body.vertices
+    return float(-moved[tip, 2].mean() / _timoshenko(load))
 
 
-@pytest.mark.slow
-def test_beam_sag_converges_to_timoshenko():
-    ratios = []
-    for counts in ((9, 4, 4), (13, 5, 5), (17, 6, 6)):
-        body, held, tip = _beam(counts)
-        ratios.append(-_linear_sag(body, held, np.zeros(len(body.vertices)))[tip, 2].mean() / _timoshenko(0.0))
-    assert ratios == sorted(ratios)
-    assert ratios[-1] > 0.8
+@pytest.mark.parametrize(("counts", "load"), [((5, 2, 2), 0.0), ((5, 2, 2), 0.02), ((6, 3, 3), 0.0)])
+def test_a_beam_of_boxes_sags_as_timoshenko_says(counts, load):
+    """Whether one cell or two are in its height."""
+    assert _sag(*_beam(counts), load) == pytest.approx(1.0, abs=0.08)
 
 
-def test_lame_constants_reach_bullet():
+def test_a_beam_of_tetrahedra_is_too_stiff():
+    """The same vertices without the knowledge that they are a grid: linear tetrahedra lock."""
+    body, held, tip = _beam((5, 2, 2))
+    assert 0.2 < _sag(Body("solid", body.vertices, body.elements), held, tip) < 0.5
+
+
+@pytest.mark.parametrize("mode", ["bending", "torsion"])
+def test_one_box_is_exact_in_bending_and_torsion(mode):
+    """Energy of a cell under u = k (x z, 0, -x^2 / 2), anticlastic, and under a twist about x, to second order."""
+    size = np.array([0.05, 0.04, 0.03])
+    body = solid_box(-size / 2, size / 2, (2, 2, 2))
+    x, y, z = body.vertices.T
+    if mode == "bending":
+        # The corners cannot follow the squares, but those are the same at all of them: a rigid motion.
+        motion = np.stack([x * z, -NU * y * z, 0 * x], axis=1)
+        expected = 0.5 * E * size[0] * size[1] * size[2] ** 3 / 12
+    else:
+        motion = np.stack([0 * x, -x * z, x * y], axis=1)
+        expected = 0.5 * E / 2 / (1 + NU) * size[0] * (size[1] * size[2] ** 3 + size[2] * size[1] ** 3) / 12
+    elasticity = Volume(body, SolidMaterial(density=RHO, youngs_modulus=E, poisson_ratio=NU))
+    elasticity.forces(body.vertices)
+    assert 0.5 * np.vdot(motion, elasticity.stiffness(motion)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_young_and_poisson():
     """Uniaxial tension of a block between free ends: Young's modulus and Poisson's ratio."""
     body = solid_box(np.zeros(3), np.array([0.02, 0.02, 0.02]), (2, 2, 2))
     material = SolidMaterial(density=RHO, youngs_modulus=E, poisson_ratio=NU, damping_time=5e-3)
@@ -93,11 +93,9 @@ def test_a_load_slows_the_vibration():
     loads = np.zeros(len(body.vertices))
     loads[tip] = load / len(tip)
     material = SolidMaterial(density=RHO, youngs_modulus=E, poisson_ratio=NU)
-    # Along the diagonal of the section, a principal direction also of the mesh, whose cells are not symmetric.
-    across = np.array([0.0, 1.0, 1.0]) / np.sqrt(2)
+    across = np.array([0.0, 0.0, 1.0])
     pull = 9.80665 * across
-    displacements = _linear_sag(body, held, loads, pull) - _linear_sag(body, held, 0 * loads, pull)
-    sag = (displacements[tip] @ across).mean()
+    sag = load * 9.80665 * (L**3 / (3 * E * INERTIA) + L / (5 / 6 * SHEAR * AREA))
     with opened(scene(body, material, held=held, loads=loads, gravity=pull / 20)) as world:  # small motion
         path = []
         for _ in range(200):
@@ -109,7 +107,7 @@ def test_a_load_slows_the_vibration():
     # Rayleigh: 33/140 of a beam's mass swings along with its tip.
     stiffness = load * 9.80665 / sag
     expected = 2 * np.pi * np.sqrt((load + 33 / 140 * RHO * AREA * L) / stiffness)
-    assert np.diff(crossings).mean() * 0.005 == pytest.approx(expected, rel=0.03)
+    assert np.diff(crossings).mean() * 0.005 == pytest.approx(expected, rel=0.04)
 
 
 def test_block_rests_on_the_table_and_slides_only_on_a_steep_one():

@@ -1,0 +1,150 @@
+"""Rope against rods, strings, catenaries and pendulums."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from mujoco_scenes import HEAVY_ELASTICA, HEAVY_SAG, G, droop, opened, run, scene, swing
+
+from muslin.core.body import Body, rope_line
+from muslin.core.material import RopeMaterial
+
+NO_GRAVITY = np.zeros(3)
+
+
+def _rope(vertices: np.ndarray) -> Body:
+    index = np.arange(len(vertices) - 1)
+    return Body("rope", vertices, np.stack([index, index + 1], axis=1))
+
+
+def _clamped(length: float, segments: int) -> Body:
+    """Along x, with one more segment behind x = 0 to be held."""
+    return rope_line(np.array([[-length / segments, 0.0, 0.0], [length, 0.0, 0.0]]), segments + 2)
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 1e5])
+def test_a_pull_stretches_it_by_force_over_stiffness(stiffness):
+    """1 % of strain, to 0.5 %, of Saint Venant and Kirchhoff: force = E A e (1 + e) (1 + e/2)."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), 11)
+    forces = np.zeros_like(body.vertices)
+    forces[-1, 0] = 0.01 * stiffness
+    with opened(scene(body, RopeMaterial(0.05, stiffness), held=np.array([0]), gravity=NO_GRAVITY)) as world:
+        stretch = run(world, 1.5, body.vertices[:1], forces, brake=8.0)[-1, 0] / 0.5 - 1.0
+    assert stretch * (1 + stretch) * (1 + stretch / 2) == pytest.approx(0.01, rel=0.005)
+
+
+@pytest.mark.parametrize("rigidity", [1e-6, 1e-2])
+def test_a_clamped_rope_sags_as_the_heavy_elastica(rigidity):
+    """To 2 % with 8 segments and 0.5 % with 16."""
+    material = RopeMaterial(HEAVY_ELASTICA * rigidity / (G * 1e-3), 1e4, rigidity, rigidity)
+    coarse, fine = (droop(_clamped(0.1, n), material) / HEAVY_SAG for n in (8, 16))
+    assert coarse == pytest.approx(1.0, abs=0.02)
+    assert fine == pytest.approx(1.0, abs=0.005)
+
+
+@pytest.mark.parametrize("time_step", [0.001, 0.005])
+def test_period_of_a_clamped_rod(time_step):
+    """3.516 / L^2 sqrt(E I / mass per length), to 1.5 %, and it decays at implicit Euler's h w^2 / 2."""
+    length, rigidity, density = 0.3, 1e-2, 0.05
+    body, path = _clamped(length, 12), []
+    material = RopeMaterial(density, 1e4, rigidity, rigidity)
+    down = np.array([0.0, 0.0, -0.5])
+    with opened(scene(body, material, held=np.array([0, 1]), gravity=down), time_step=time_step) as world:
+        for _ in range(round(1.0 / time_step)):
+            world.step(body.vertices[:2], None)
+            path.append(world.state().positions[-1, 2])
+    frequency, rate = swing(time_step, np.array(path))
+    assert frequency == pytest.approx(3.516 / length**2 * np.sqrt(rigidity / density), rel=0.015)
+    assert rate == pytest.approx(time_step * frequency**2 / 2, rel=0.05)
+
+
+def test_a_slack_rope_hangs_as_a_catenary():
+    """1 m between points 0.8 m apart: the sag to 1 %, started from a bow."""
+    half = 0.4
+    scale = np.array([0.1, 1.0])
+    for _ in range(60):  # bisection of 2 a sinh(half / a) = 1
+        a = scale.mean()
+        scale = np.array([a, scale[1]]) if 2 * a * np.sinh(half / a) > 1.0 else np.array([scale[0], a])
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 21)
+    share = np.linspace(0.0, 1.0, 21)
+    start = np.stack([0.8 * share, 0 * share, -1.2 * share * (1 - share)], axis=1)
+    held = np.array([0, 20])
+    material = RopeMaterial(0.05, 5000.0, 1e-7, 1e-7, damping_time=1e-3)
+    with opened(scene(body, material, held=held, start=start)) as world:
+        sag = -run(world, 4.0, start[held], brake=4.0)[:, 2].min()
+    assert sag == pytest.approx(a * (np.cosh(half / a) - 1), rel=0.01)
+
+
+def test_pendulum_period():
+    """A stiff rope from one held vertex: sqrt(3 g / 2 L), to 1 % for the lumped masses."""
+    body, path = rope_line(np.array([[0.0, 0.0, 0.0], [0.0, 0.05, -0.4975]]), 11), []
+    with opened(scene(body, RopeMaterial(0.05, 1e4, 1.0, 1.0), held=np.array([0]))) as world:
+        for _ in range(800):
+            world.step(body.vertices[:1], None)
+            path.append(world.state().positions[-1, 1])
+    assert swing(0.005, np.array(path))[0] == pytest.approx(np.sqrt(1.5 * G / 0.5), rel=0.01)
+
+
+@pytest.mark.parametrize("tension", [5.0, 2000.0])
+def test_a_taut_string_stays_put(tension):
+    """Also where a wave crosses a segment in a hundredth of a step."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 41)
+    start = body.vertices * [1.02, 0.0, 0.0] + 0.01 * np.sin(np.pi * body.vertices[:, :1]) * [0.0, 0.0, 1.0]
+    held = np.array([0, 40])
+    material = RopeMaterial(0.005, tension / 0.02, 1e-6, 1e-6)
+    with opened(scene(body, material, held=held, start=start)) as world:
+        final = run(world, 2.0, start[held])
+    sag = 0.005 * G / (8 * tension)
+    assert -final[20, 2] == pytest.approx(sag, rel=0.06)
+
+
+@pytest.mark.parametrize(("bending", "twist"), [(1e-3, 1e-2), (1e-3, 1e-3), (1e-3, 1e-4)])
+def test_a_quarter_circle_pushed_out_of_its_plane_bends_and_twists(bending, twist):
+    """Its end yields by P R^3 (pi / (4 E I) + (3 pi / 4 - 2) / (G J)); to 3 %."""
+    radius, segments = 0.1, 16
+    angle = np.linspace(0.0, np.pi / 2, segments + 1)
+    arc = radius * np.stack([np.sin(angle), 1 - np.cos(angle), 0 * angle], axis=1)
+    body = _rope(np.concatenate([[[-radius * np.pi / 2 / segments, 0.0, 0.0]], arc]))
+    forces = np.zeros_like(body.vertices)
+    expected = 0.01 * radius
+    forces[-1, 2] = expected / (radius**3 * (np.pi / 4 / bending + (0.75 * np.pi - 2) / twist))
+    material = RopeMaterial(0.05, 1e4, bending, twist, damping_time=0.01)
+    with opened(scene(body, material, held=np.array([0, 1]), gravity=NO_GRAVITY)) as world:
+        moved = run(world, 5.0, body.vertices[:2], forces, brake=8.0)
+    assert moved[-1, 2] == pytest.approx(expected, rel=0.03)
+
+
+def _helix() -> Body:
+    angle = np.linspace(0.0, 4 * np.pi, 60)
+    return _rope(np.stack([0.05 * np.cos(angle), 0.05 * np.sin(angle), 0.01 * angle], axis=1))
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_helix_is_at_rest_where_it_was_made_and_wherever_it_was_taken(turned):
+    body = _helix()
+    turn = np.array([[0.0, -0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.8, 0.6]])
+    start = body.vertices @ turn.T + [0.1, 0.2, 0.3] if turned else body.vertices
+    material = RopeMaterial(bending_rigidity=1e-2, twist_rigidity=1e-2)
+    with opened(scene(body, material, gravity=NO_GRAVITY, start=start)) as world:
+        np.testing.assert_allclose(run(world, 0.5), start, atol=1e-9)
+
+
+def test_a_straight_rope_started_bent_straightens():
+    straight = rope_line(np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), 17)
+    angle = straight.vertices[:, 0] / 0.2
+    start = 0.2 * np.stack([np.sin(angle), 0 * angle, 1 - np.cos(angle)], axis=1)
+    what = scene(straight, RopeMaterial(bending_rigidity=1e-2), gravity=NO_GRAVITY, start=start)
+    with opened(what) as world:
+        np.testing.assert_allclose(world.state().positions, start, atol=1e-15)
+        ends = run(world, 4.0, brake=4.0)[[0, -1]]
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(0.4, rel=1e-3)
+
+
+@pytest.mark.parametrize("vertices", [2, 3])
+def test_the_shortest_ropes_fall(vertices):
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), vertices)
+    with opened(scene(body, replace(RopeMaterial(), bending_rigidity=0.0, twist_rigidity=0.0))) as world:
+        np.testing.assert_allclose(run(world, 0.1)[:, 2], -G * 0.1 * 0.105 / 2, rtol=1e-8)

@@ -1,0 +1,231 @@
+"""How fast rollouts are, always against something else in the same run.
+
+(a) muslin's MuJoCo rollout against a bare ``mj_step`` loop of the same model under the same motion;
+(b) muslin's PyBullet rollout against a stock pybullet loop of the same mesh (stepSimulation at the same substep,
+getMeshData at every observation); (c) 2 worker processes against 1; (d) cost against vertices; (e) frames rendered
+a second::
+
+    make bench-sim
+"""
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from table import Row, report
+
+from muslin.core.comparison.compare_simulators import latin_hypercube
+from muslin.core.effect import Effect
+from muslin.core.material import DEFAULT_PRIORS, ClothMaterial
+from muslin.core.obstacles import Table
+from muslin.core.parameters import ParameterSpace
+from muslin.core.registry import REGISTRY
+from muslin.core.rollout import rollout
+from muslin.core.scenario import Scenario
+from muslin.core.scenarios import preset
+from muslin.core.study import Problem, SimulationPool, Task
+
+MATERIAL = ClothMaterial()
+GRAVITY = np.array([0.0, 0.0, -9.80665])
+SEED = 1
+
+
+def timed(call: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    call()
+    return time.perf_counter() - began
+
+
+def paired(one: Callable[[], float], other: Callable[[], float], times: int) -> tuple[float, float, float]:
+    """Run both in turn, A B A B; median ratio one / other, and both medians [s]."""
+    pairs = [(one(), other()) for _ in range(times + 1)][1:]  # the first warms up
+    return (
+        statistics.median(a / b for a, b in pairs),
+        statistics.median(a for a, _ in pairs),
+        statistics.median(b for _, b in pairs),
+    )
+
+
+def fling(vertices: int = 9) -> Scenario:
+    return preset("fling").scenario(vertices=(vertices, vertices))
+
+
+def bare_mujoco(scenario: Scenario) -> float:
+    """Seconds of ``mj_step`` and of putting the held vertices where they must be, nothing else."""
+    import mujoco
+
+    simulator = REGISTRY.get("simulator", "mujoco")()
+    scene = scenario.scene(MATERIAL, GRAVITY)
+    world = simulator.open(scene)
+    model, data = world._model, world._data
+    dt, start = world.time_step, scenario.times[0]
+    settle = int(np.ceil(scenario.settle / dt - 1e-9))
+    steps = int(np.ceil((scenario.times[-1] - start) / dt - 1e-9))
+    clock = np.maximum(start + dt * np.arange(-settle, steps + 1), start)
+    path = scenario.held_positions(clock, scene.start_positions)
+    dofs = (3 * scene.held[:, None] + np.arange(3)).ravel()
+    target = path.reshape(len(path), -1) - scene.body.vertices[scene.held].ravel()
+    velocity = np.diff(target, axis=0) / dt
+    began = time.perf_counter()
+    for k in range(len(velocity)):
+        data.qvel[dofs] = velocity[k]
+        mujoco.mj_step(model, data)
+        data.qpos[dofs] = target[k + 1]
+        data.qvel[dofs] = velocity[k]
+    seconds = time.perf_counter() - began
+    world.close()
+    return seconds
+
+
+def overhead(rows: list[Row], times: int) -> None:
+    simulator = REGISTRY.get("simulator", "mujoco")()
+    drag: Effect = REGISTRY.get("effect", "air-drag")(drag_coefficient=1.2, lift_coefficient=0.3)
+    for name, goal, effects in (("without effects", 1.10, []), ("with air drag", 1.40, [drag])):
+        scenario = fling()
+        ratio, ours, bare = paired(
+            lambda s=scenario, e=effects: timed(lambda: rollout(simulator, s, MATERIAL, e)),
+            lambda s=scenario: bare_mujoco(s),
+            times,
+        )
+        rows.append(
+            Row(f"(a) MuJoCo rollout {name} over bare mj_step", round(ratio, 3), "x", f"<= {goal}", ratio <= goal)
+        )
+        rows.append(Row(f"(a) MuJoCo rollout {name}", round(1e3 * ours, 1), f"ms, bare {1e3 * bare:.1f} ms"))
+
+
+def stock_pybullet(scenario: Scenario, substep: float, substeps: int) -> float:
+    """Seconds of the loop in pybullet's own deformable examples, on the same mesh, table and substep."""
+    import pybullet as p
+    from muslin.backends.pybullet.meshfile import mesh_file
+
+    scene = scenario.scene(MATERIAL, GRAVITY)
+    client = p.connect(p.DIRECT)
+    try:
+        p.resetSimulation(p.RESET_USE_DEFORMABLE_WORLD, physicsClientId=client)
+        p.setGravity(*GRAVITY, physicsClientId=client)
+        p.setTimeStep(substep, physicsClientId=client)
+        for table in scene.obstacles:
+            assert isinstance(table, Table)
+            box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[2, 2, 0.5], physicsClientId=client)
+            p.createMultiBody(0, box, basePosition=[0, 0, table.height - 0.5], physicsClientId=client)
+        with mesh_file(scene.body) as path:
+            cloth = p.loadSoftBody(
+                str(path),
+                mass=float(scene.body.measures.sum() * MATERIAL.areal_density),
+                useMassSpring=1,
+                useBendingSprings=1,
+                springElasticStiffness=0.75 * MATERIAL.stretch_stiffness,
+                springBendingStiffness=0.01 * MATERIAL.stretch_stiffness,
+                springDampingStiffness=0.0,
+                frictionCoeff=MATERIAL.friction,
+                collisionMargin=0.002,
+                physicsClientId=client,
+            )
+        for vertex in scene.held.tolist():
+            p.createSoftBodyAnchor(cloth, vertex, -1, -1, physicsClientId=client)
+        start = scenario.times[0]
+        settle = int(np.ceil(scenario.settle / (substep * substeps) - 1e-9)) * substeps
+        every = max(1, round((scenario.times[1] - start) / substep))
+        steps = int(np.ceil((scenario.times[-1] - start) / (substep * substeps) - 1e-9)) * substeps
+        began = time.perf_counter()
+        for k in range(settle + steps):
+            p.stepSimulation(physicsClientId=client)
+            if k >= settle and (k - settle) % every == 0:
+                p.getMeshData(cloth, -1, flags=p.MESH_DATA_SIMULATION_MESH, physicsClientId=client)
+        return time.perf_counter() - began
+    finally:
+        p.disconnect(client)
+
+
+def against_stock(rows: list[Row], times: int) -> None:
+    simulator = REGISTRY.get("simulator", "pybullet")()
+    below = replace(fling(), obstacles=(Table(0.55),))
+    for name, scenario in (("fling", fling()), ("fling over a table", below)):
+        world = simulator.open(scenario.scene(MATERIAL, GRAVITY))
+        substeps = world._substeps
+        substep = world.time_step / substeps
+        world.close()
+        ratio, ours, stock = paired(
+            lambda s=scenario: timed(lambda: rollout(simulator, s, MATERIAL)),
+            lambda s=scenario, h=substep, n=substeps: stock_pybullet(s, h, n),
+            times,
+        )
+        rows.append(Row(f"(b) PyBullet rollout over the stock loop, {name}", round(ratio, 3), "x", "<= 1", ratio <= 1))
+        told = f"s, stock {stock:.2f} s, substep {1e3 * substep:.2f} ms"
+        rows.append(Row(f"(b) PyBullet rollout, {name}", round(ours, 2), told))
+
+
+def problem(engine: str, scenario: Scenario) -> Problem:
+    return Problem(
+        recordings={},
+        fit_on=(scenario.name,),
+        hold_out=(),
+        scenarios={scenario.name: scenario},
+        simulator=REGISTRY.get("simulator", engine)(),
+        extractor=REGISTRY.get("extractor", "markers")(),
+        material=MATERIAL,
+        space=ParameterSpace(DEFAULT_PRIORS["cloth"]),
+        fixed={},
+        effects={},
+    )
+
+
+def scaling(rows: list[Row], times: int) -> None:
+    scenario = fling()
+    what = problem("mujoco", scenario)
+    values = what.space.from_unit(latin_hypercube(60, len(what.space), SEED))
+    tasks = [Task(dict(zip(what.space.names, v.tolist(), strict=True)), scenario.name) for v in values]
+    with SimulationPool(what, 1) as one, SimulationPool(what, 2) as two:
+        for pool in (one, two):  # processes start, engines load
+            list(pool.map(tasks[:4]))
+        ratio, alone, both = paired(
+            lambda: timed(lambda: list(one.map(tasks))), lambda: timed(lambda: list(two.map(tasks))), times
+        )
+    told = f"x, {alone:.1f} s and {both:.1f} s for {len(tasks)} flings"
+    rows.append(Row("(c) 2 worker processes against 1, MuJoCo", round(ratio, 2), told, ">= 1.8", ratio >= 1.8))
+
+
+def sizes(rows: list[Row]) -> None:
+    for engine in ("mujoco", "pybullet"):
+        simulator = REGISTRY.get("simulator", engine)()
+        for side in (9, 15, 21, 31):
+            scenario = fling(side)
+            short = replace(scenario, times=scenario.times[: round(0.3 * 30) + 1], settle=0.0)
+            seconds = min(timed(lambda s=short: rollout(simulator, s, MATERIAL)) for _ in range(2))
+            simulated = float(short.times[-1] - short.times[0])
+            told = "s of computation a simulated second"
+            rows.append(Row(f"(d) {engine}, {side * side} vertices", round(seconds / simulated, 2), told))
+
+
+def rendering(rows: list[Row]) -> None:
+    from muslin.core.renderer import frames_per_second
+
+    for name in REGISTRY.names("renderer"):
+        for side in (9, 31):
+            try:
+                rate: Any = round(frames_per_second(name, side), 1)
+            except Exception as error:
+                rate = f"not here: {error}"
+            rows.append(Row(f"(e) renderer {name}, 320 x 320, {side * side} vertices", rate, "frames a second"))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--times", type=int, default=5, help="pairs of every comparison")
+    arguments = parser.parse_args()
+    rows: list[Row] = []
+    began = time.monotonic()
+    overhead(rows, 4 * arguments.times)
+    against_stock(rows, max(2, arguments.times // 2))
+    scaling(rows, arguments.times)
+    sizes(rows)
+    rendering(rows)
+    report("sim", rows, [SEED], time.monotonic() - began)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""``muslin new`` for ropes and for objects of one's own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from muslin.cli.main import run
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.measurement_store import load_measurement, save_measurement
+from muslin.core.motion import Motion
+from muslin.core.scenarios import preset
+from muslin.core.series import PointSeries
+from muslin.core.study import build_problem, read_config
+
+SHEET = "v -0.1 0 0\nv 0.1 0 0\nv 0 0 -0.1\nv -0.1 0 -0.2\nv 0.1 0 -0.2\nf 1 3 2\nf 1 4 3\nf 4 5 3\nf 5 2 3\n"
+
+
+def status(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as caught:
+        run([str(a) for a in arguments])
+    return int(caught.value.code or 0)
+
+
+def save(folder: Path, points: np.ndarray, motion: Motion) -> Path:
+    series = PointSeries(np.linspace(0, 0.2, 5), np.tile(points, (5, 1, 1)))
+    save_measurement(Measurement((Recording("one", series, motion),)), folder / "m.zarr")
+    return folder / "m.zarr"
+
+
+def test_a_rope(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Five markers along a cable: the study names their vertices, with sizes and units of a rope."""
+    scenario = preset("cable").scenario(size=[0.8], vertices=[21])
+    measurement = save(tmp_path, scenario.start_vertices()[::5], scenario.motion)
+    path = tmp_path / "s.toml"
+    options = ("--measurement", measurement, "--scenario", "cable", "--size", "0.8", "--vertices", "21")
+    assert status("new", path, *options) == 0, capsys.readouterr().err
+    text = path.read_text()
+    for words in ("size = [0.8]  # length [m]", "vertices = [21]", "linear_density = 0.05  # [kg/m]", 'unit = "N m2"'):
+        assert words in text
+    config = read_config(path)
+    assert config.scenario.markers == [0, 5, 10, 15, 20]
+    assert build_problem(config, load_measurement(measurement), tmp_path).material.kind == "rope"
+
+
+def test_the_material_of_a_scenario_is_written(tmp_path: Path) -> None:
+    scenario = preset("wiping").scenario(vertices=[3, 3])
+    measurement = save(tmp_path, scenario.start_vertices(), scenario.motion)
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", measurement, "--scenario", "wiping", "--vertices", "3,3") == 0
+    text = path.read_text()
+    assert "areal_density = 0.5" in text and "[parameters.friction]" in text
+    assert '# obstacles = [{ kind = "table", height = 0.0, friction = 1.0 }]  # built in' in text
+
+
+def test_a_mesh(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trimesh")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "sheet.obj").write_text(SHEET)
+    corners = np.array([[-0.2, 0, 1.0], [0.2, 0, 1], [0, 0, 0.8], [-0.2, 0, 0.6], [0.2, 0, 0.6]])
+    measurement = save(tmp_path, corners, Motion.from_positions(np.zeros(1), np.array([[[0, 0, 1.0]]])))
+    path = tmp_path / "s.toml"
+    base = ("new", path, "--measurement", measurement, "--scenario", "swing", "--mesh", tmp_path / "parts/sheet.obj")
+    assert status(*base) == 2
+    assert "say where it is held" in capsys.readouterr().err and not path.exists()
+    assert status(*base, "--mesh-scale", "2", "--grasp-points", "-0.2,0,0; 0.2,0,0") == 2
+    assert "2 grippers" in capsys.readouterr().err
+    assert status(*base, "--mesh-scale", "2", "--grasp-points", "-0.2,0") == 2
+    assert "--grasp-points must be x,y,z" in capsys.readouterr().err
+    assert status(*base, "--size", "1,1", "--grasp-points", "-0.2,0,0") == 2
+    assert "--size does not go with --mesh" in capsys.readouterr().err
+    assert status(*base, "--mesh-scale", "-1", "--grasp-points", "-0.2,0,0") == 2
+    assert "[scenario.mesh_scale]" in capsys.readouterr().err
+    assert status(*base, "--mesh-scale", "2", "--grasp-points", "-0.2,0,0") == 0
+    config = read_config(path)
+    assert config.scenario.mesh == "parts/sheet.obj" and config.scenario.grasp_points == [(-0.2, 0.0, 0.0)]
+    problem = build_problem(config, load_measurement(measurement), tmp_path)
+    np.testing.assert_allclose(problem.scenarios["one"].start_vertices(), corners)
+    np.testing.assert_allclose(problem.scenarios["one"].markers, np.eye(5))
+
+
+def test_a_mesh_in_pieces_is_remarked_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("trimesh")
+    corners, faces = SHEET.split("f", 1)
+    apart = "v 0.4 0 0\nv 0.5 0 0\nv 0.4 0 -0.1\n"
+    (tmp_path / "two.obj").write_text(f"{corners}{apart}f{faces}f 6 8 7\n")
+    measurement = save(tmp_path, np.tile([0.0, 0.0, 0.9], (8, 1)), Motion.still())
+    base = ("new", tmp_path / "s.toml", "--measurement", measurement, "--scenario", "swing")
+    assert status(*base, "--mesh", tmp_path / "two.obj", "--grasp-points", "-0.1,0,0") == 0
+    assert "2 parts that do not hang together" in capsys.readouterr().out
