@@ -54,7 +54,7 @@ class ClothMaterial:
     stretch_stiffness: float = 300.0
     bending_rigidity: float = 2e-5
     poisson_ratio: float = 0.3
-    damping_time: float = 0.0
+    damping_time: float = 0.005
     friction: float = 0.3
     weft_stretch_ratio: float = 1.0
     weft_bending_ratio: float = 1.0

@@ -16,6 +16,7 @@ from . import rod, shell
 from .box import cell_of_elements, frame, quadratic_cells, quaternion
 from .engine import engine
 from .obstacles import geoms
+from .soft_bending import is_soft
 from .stencils import quadruples, spread
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ class Model:
         turn: the axes of the displacements as columns ``(3, 3)``; None: the world's.
         commanded: coordinates of the held vertices ``(3 H,)``, then twists of clamped segments, which stay as they are.
         masses: of every vertex ``(V,)`` [kg], loads included.
+        soft_bending: what bending MuJoCo does not know, as a matrix ``(V, V)`` [N/m], or ``(0, 0)``.
     """
 
     model: "mujoco.MjModel"
@@ -58,6 +60,7 @@ class Model:
     turn: FloatArray | None
     commanded: IntArray
     masses: FloatArray
+    soft_bending: FloatArray
 
 
 def compiled(scene: Scene, time_step: float) -> Model:
@@ -68,7 +71,7 @@ def compiled(scene: Scene, time_step: float) -> Model:
     """
     body, count = scene.body, len(scene.body.vertices)
     bends = isinstance(scene.material, ClothMaterial) and scene.material.bending_rigidity > 0
-    bending, sets = np.zeros((0, 0)), np.zeros((0, 4), np.int64)
+    soft, bending, sets = np.zeros((0, 0)), np.zeros((0, 0)), np.zeros((0, 4), np.int64)
     if bends:
         assert isinstance(scene.material, ClothMaterial)
         bending = scene.material.bending_rigidity * bending_matrix(body, scene.held, scene.material.weft_bending_ratio)
@@ -76,7 +79,11 @@ def compiled(scene: Scene, time_step: float) -> Model:
             folds = rest_folds(body, scene.held, scene.material.weft_bending_ratio)
             bending += rest_stress(body, bending, folds[0], scene.material.bending_rigidity * folds[1])
         bending[np.abs(bending) < 1e-13 * np.abs(bending).max(initial=0.0)] = 0.0
-        sets = quadruples(bending, body.vertices)
+        masses = body.vertex_measures * scene.material.density + scene.loads
+        if is_flat(body) and is_soft(bending, masses, scene.held, time_step, scene.material.damping_time):
+            soft, bending = bending, soft
+        else:
+            sets = quadruples(bending, body.vertices)
     xml = mjcf(scene, time_step, sets)
     if body.kind == "cloth" and any(isinstance(o, StaticMesh) for o in scene.obstacles):
         # MuJoCo holds a triangle on a mesh at one point, its deepest, which goes to and fro between the corners
@@ -107,7 +114,7 @@ def compiled(scene: Scene, time_step: float) -> Model:
     stretch, cells = _write_material(model, scene, bending)
     turn = frame(body) if quadratic_cells(body) else np.eye(3)
     turned = None if np.array_equal(turn, np.eye(3)) else turn
-    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses)
+    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft)
 
 
 def mjcf(scene: Scene, time_step: float, sets: IntArray) -> str:
@@ -140,7 +147,7 @@ def mjcf(scene: Scene, time_step: float, sets: IntArray) -> str:
     <flexcomp name="body" type="direct" dim="{body.elements.shape[1] - 1}"{parts}
         mass="{mass:.17g}" radius="{radius:.17g}" point="{points}" element="{elements}">
       <contact selfcollide="none" contype="2" conaffinity="1"/>
-      {_elasticity(scene, time_step, flat=not len(sets) or is_flat(body))}
+      {_elasticity(scene, flat=not len(sets) or is_flat(body))}
     </flexcomp>
     </body>
     {obstacles}
@@ -156,29 +163,21 @@ def _radius(scene: Scene) -> float:
     return scene.contact_radius or min([RADIUS, *(0.5 * o.depth for o in scene.obstacles)])
 
 
-def _elasticity(scene: Scene, time_step: float, flat: bool) -> str:
+def _elasticity(scene: Scene, flat: bool) -> str:
     """The ``<elasticity>`` element of the flex.
 
-    The ``discrete`` integrator is a linearly implicit Euler scheme: for a step h it damps a mode of
-    angular frequency w at the rate h w^2 / 2 [1/s], as a stiffness-proportional damping of time h
-    would. Solids get damping_time - h / 2 instead of damping_time, which halves that. More cannot be
-    taken off: the linear scheme with damping -c h is stable for every frequency only if c <= 1/2
-    (its trace and determinant, 1 + (1 - x) / (1 + (1 - c) x) and 1 / (1 + (1 - c) x) with x = (h w)^2,
-    must satisfy |trace| < 1 + determinant). Shells keep the full damping: they buckle, and the
-    argument is linear.
+    The world sets the damping step by step; what is said here decides whether MuJoCo makes room for it.
     """
     m = scene.material
     if isinstance(m, ClothMaterial):
         # all of this is overwritten but which arrays there are: hinges of its own only where the rest shape is curved
-        return (
-            f'<elasticity young="1" poisson="0" thickness="1" damping="{m.damping_time:.17g}" '
-            f'elastic2d="{"stretch" if flat else "both"}"/>'
-        )
+        kind = "stretch" if flat else "both"
+        return f'<elasticity young="1" poisson="0" thickness="1" damping="{m.damping_time:.17g}" elastic2d="{kind}"/>'
     if isinstance(m, RopeMaterial):
         return f'<elasticity young="1" damping="{m.damping_time:.17g}"/>'
     return (
         f'<elasticity young="{m.youngs_modulus:.17g}" poisson="{m.poisson_ratio:.17g}" '
-        f'damping="{m.damping_time - time_step / 2:.17g}"/>'
+        f'damping="{m.damping_time:.17g}"/>'
     )
 
 

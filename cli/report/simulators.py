@@ -72,7 +72,9 @@ def _pair(
 
 def _values(found: SimulatorComparison, draw: int) -> str:
     values = found.space.from_unit(found.unit_draws[draw])
-    return ", ".join(f"{p.name} {v:.3g} {p.unit if p.unit != '1' else ''}".strip() for p, v in zip(found.space, values, strict=True))
+    return ", ".join(
+        f"{p.name} {v:.3g} {p.unit if p.unit != '1' else ''}".strip() for p, v in zip(found.space, values, strict=True)
+    )
 
 
 def _time_figure(found: SimulatorComparison, one: SimulatorRun, other: SimulatorRun, apart: FloatArray, i: int) -> str:

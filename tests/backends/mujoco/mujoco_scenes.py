@@ -80,7 +80,7 @@ def along_warp(body: Body, direction: Any) -> Body:
     return replace(body, warp=shares)
 
 
-def droop(body: Body, material: Material, length: float = 0.1, gravity: float = G, seconds: float = 1.2) -> float:
+def droop(body: Body, material: Material, length: float = 0.1, gravity: float = G, seconds: float = 3.0) -> float:
     """Mean sag of the end at x = ``length`` over ``length`` after the part behind x = 0 was clamped level."""
     held = np.flatnonzero(body.vertices[:, 0] < 1e-9)
     tip = np.flatnonzero(body.vertices[:, 0] > length - 1e-9)

@@ -47,7 +47,7 @@ def test_a_clamped_rope_sags_as_the_heavy_elastica(rigidity):
 
 @pytest.mark.parametrize("time_step", [0.001, 0.005])
 def test_period_of_a_clamped_rod(time_step):
-    """3.516 / L^2 sqrt(E I / mass per length), to 1.5 %, and it decays at implicit Euler's h w^2 / 2."""
+    """3.516 / L^2 sqrt(E I / mass per length), to 1.5 %, and it decays at the theta method's (theta - 1/2) h w^2."""
     length, rigidity, density = 0.3, 1e-2, 0.05
     body, path = _clamped(length, 12), []
     material = RopeMaterial(density, 1e4, rigidity, rigidity)
@@ -58,7 +58,7 @@ def test_period_of_a_clamped_rod(time_step):
             path.append(world.state().positions[-1, 2])
     frequency, rate = swing(time_step, np.array(path))
     assert frequency == pytest.approx(3.516 / length**2 * np.sqrt(rigidity / density), rel=0.015)
-    assert rate == pytest.approx(time_step * frequency**2 / 2, rel=0.05)
+    assert rate == pytest.approx((1 / 1.7 - 0.5) * time_step * frequency**2, rel=0.15)
 
 
 def test_a_slack_rope_hangs_as_a_catenary():
@@ -96,7 +96,7 @@ def test_a_taut_string_stays_put(tension):
     held = np.array([0, 40])
     material = RopeMaterial(0.005, tension / 0.02, 1e-6, 1e-6)
     with opened(scene(body, material, held=held, start=start)) as world:
-        final = run(world, 2.0, start[held])
+        final = run(world, 2.0, start[held], brake=8.0)
     sag = 0.005 * G / (8 * tension)
     assert -final[20, 2] == pytest.approx(sag, rel=0.06)
 
@@ -147,4 +147,4 @@ def test_a_straight_rope_started_bent_straightens():
 def test_the_shortest_ropes_fall(vertices):
     body = rope_line(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), vertices)
     with opened(scene(body, replace(RopeMaterial(), bending_rigidity=0.0, twist_rigidity=0.0))) as world:
-        np.testing.assert_allclose(run(world, 0.1)[:, 2], -G * 0.1 * 0.105 / 2, rtol=1e-8)
+        np.testing.assert_allclose(run(world, 0.1)[:, 2], -G * 0.05 * (0.1 + 0.005 * (2 / 1.7 - 1)), rtol=1e-8)

@@ -57,15 +57,17 @@ def test_starts_at_rest_in_the_order_of_the_mesh(body, material):
 
 @pytest.mark.parametrize(("body", "material"), OBJECTS)
 @pytest.mark.parametrize("loaded", [False, True])
-def test_free_fall_is_symplectic_euler(body, material, loaded):
-    """g t (t + h) / 2 in any direction, whatever hangs on the vertices."""
+def test_free_fall_is_that_of_the_theta_method(body, material, loaded):
+    """g t (t + (2 theta - 1) h) / 2 in any direction, whatever hangs on the vertices."""
     gravity = np.array([1.0, -2.0, -9.0])
     loads = np.zeros(len(body.vertices))
     loads[-1] = 0.01 * loaded
     with opened(scene(body, material, gravity=gravity, loads=loads)) as world:
         fallen = run(world, 0.3) - body.vertices
         np.testing.assert_allclose(world.state().velocities, np.tile(0.3 * gravity, (len(loads), 1)), rtol=1e-8)
-    np.testing.assert_allclose(fallen, np.tile(gravity * 0.15 * 0.305, (len(loads), 1)), rtol=1e-8)
+    np.testing.assert_allclose(
+        fallen, np.tile(gravity * 0.15 * (0.3 + 0.005 * (2 / 1.9 - 1)), (len(loads), 1)), rtol=1e-8
+    )
 
 
 @pytest.mark.parametrize(("body", "material"), OBJECTS)
@@ -110,7 +112,7 @@ def test_a_table_carries_a_sheet_and_friction_holds_it():
 
 
 def test_a_warning_fails_the_rollout_with_mujocos_words():
-    said = r"MuJoCo warned at 0\.005 s: Nan, Inf or huge value in QACC"
+    said = r"MuJoCo warned at 0\.00[0-9]+ s: Nan, Inf or huge value in QACC"
     with opened(scene(SMALL_CLOTH, ClothMaterial())) as world, pytest.raises(RolloutFailed, match=said):
         world.step(NOWHERE, np.full((16, 3), 1e12))
 

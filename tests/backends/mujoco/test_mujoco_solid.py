@@ -81,26 +81,27 @@ def test_masses_add_up_with_loads():
 
 
 @pytest.mark.parametrize("time_step", [0.001, 0.002])
-def test_numerical_damping_of_a_solid_is_halved(time_step):
-    """An undamped beam's first mode decays at h w^2 / 4, half of what linearly implicit Euler does to it."""
+def test_an_undamped_solid_hardly_decays(time_step):
+    """An undamped beam's first mode decays at (1 / 1.9 - 1/2) h w^2, a 19th of what implicit Euler does to it."""
     frequency, rate = swing(time_step, beam_sag(0.8, gravity=0.3, time_step=time_step))
-    assert rate == pytest.approx(time_step * frequency**2 / 4, rel=0.03)
+    assert rate == pytest.approx((1 / 1.9 - 0.5) * time_step * frequency**2, rel=0.2)
 
 
 @pytest.mark.parametrize("damping_time", [0.002, 0.005])
-def test_damping_time_adds_beta_w2_over_2(damping_time):
+def test_damping_time_is_beta_w2_over_2(damping_time):
+    """What the integrator damps is taken off."""
     step = 0.001
     frequency, rate = swing(step, beam_sag(0.8, gravity=0.3, time_step=step, damping_time=damping_time))
-    assert rate - step * frequency**2 / 4 == pytest.approx(damping_time * frequency**2 / 2, rel=0.03)
+    assert rate == pytest.approx(damping_time * frequency**2 / 2, rel=0.03)
 
 
 @pytest.mark.parametrize("load", [0.0, 0.101])
 def test_an_undamped_beam_gains_no_energy(load):
-    """Negative damping of h / 2 is the edge of stability: swings must shrink, also large and fast ones."""
+    """Swings do not grow, also large and fast ones."""
     sag = beam_sag(4.0, load=load)
-    assert np.ptp(sag[-200:]) < 0.5 * np.ptp(sag[:200])
+    assert np.ptp(sag[-200:]) < np.ptp(sag[:200])
     shaking = np.abs(np.diff(sag, n=2))
-    assert shaking[-100:].max() < 0.5 * shaking[:100].max()
+    assert shaking[-100:].max() < shaking[:100].max()
 
 
 def test_a_turned_box_is_the_same_box():

@@ -59,7 +59,7 @@ def test_a_factor_four_is_a_material_four_times_as_stiff(kind):
     held, factor, paths = np.array([0, 1]), np.full(len(body.elements), 4.0), []
     for m, f in ((material, factor), (stiff, None), (material, None)):
         with opened(scene(body, m, held=held)) as world:
-            for _ in range(40):
+            for _ in range(60):
                 world.step(body.vertices[held], None, f)
             paths.append(world.state().positions.copy())
     np.testing.assert_allclose(paths[0], paths[1], atol=1e-9)
