@@ -12,7 +12,19 @@ import muslin
 
 ROOT = Path(muslin.__file__).parent
 ROOMS = ("core", "backends", "perception", "inference", "plugins", "cli")
-ENGINES = ("mujoco", "pybullet", "torch", "scipy", "cv2", "trimesh", "matplotlib", "jinja2", "xarray", "ezc3d", "meshio")
+ENGINES = (
+    "mujoco",
+    "pybullet",
+    "torch",
+    "scipy",
+    "cv2",
+    "trimesh",
+    "matplotlib",
+    "jinja2",
+    "xarray",
+    "ezc3d",
+    "meshio",
+)
 LONGEST = 300
 
 

@@ -31,9 +31,9 @@ def is_soft(bending: FloatArray, masses: FloatArray, held: IntArray, time_step: 
 class SoftBending:
     """The force of bending ``-B (x + (c + beta) v)``.
 
-    A step of MuJoCo takes x to x + tau V, and is thrown on from there to the whole step h. With c = h - tau, where tau is MuJoCo's own step, a mode of frequency w is multiplied by a matrix of determinant
-    (1 - h c w^2) (1 - h tau w^2) + h w^2 (h - h tau c w^2) = 1: it neither grows nor decays. For tau = h it is
-    symplectic Euler. beta damps as it does the rest of the material.
+    A step of MuJoCo takes x to x + tau V, and is thrown on from there to the whole step h. With c = h - tau a mode of
+    frequency w is multiplied by a matrix of determinant (1 - h c w^2) (1 - h tau w^2) + h w^2 (h - h tau c w^2) = 1:
+    it neither grows nor decays. For tau = h it is symplectic Euler. beta damps as it does the rest of the material.
 
     Args:
         matrix: B ``(V, V)`` [N/m].

@@ -5,15 +5,16 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.errors import RolloutFailed
 from ...core.scene import Scene
-from ...core.simulator import State, World
+from ...core.simulator import State, World, needed_capabilities
 from .engine import WARNINGS, engine
 from .model import compiled
 from .rod import start_twist
 from .soft_bending import SoftBending
 
 #: How far beyond MuJoCo's own step, as a part of it, a step goes that touches nothing, by kind: see
-#: :meth:`MujocoWorld._glide`. 1 would not damp at all; ropes that resist torsion ten times more than bending
-#: start to shake at 0.8, since MuJoCo leaves terms out of its stiffness that are not positive definite.
+#: :meth:`MujocoWorld._glide`. 1 would not damp at all. MuJoCo leaves terms out of its stiffness that are not positive
+#: definite: straight ropes that resist torsion ten times more than bending start to shake at 0.8, and ropes that
+#: are curved at rest at 0.3; those get none.
 OVERSHOOT = {"cloth": 0.9, "rope": 0.7, "solid": 0.9}
 #: The smallest factor on a stiffness: MuJoCo leaves out a flex of which the first number is zero.
 _SMALLEST_FACTOR = 1e-9
@@ -65,7 +66,8 @@ class MujocoWorld(World):
         self._damping_time = scene.material.damping_time
         self._touching = False
         self._bending = SoftBending(made.soft_bending, self._damping_time) if made.soft_bending.size else None
-        self._overshoot = OVERSHOOT[scene.body.kind]
+        bent = scene.body.kind == "rope" and "curved-rest" in needed_capabilities(scene)
+        self._overshoot = 0.0 if bent else OVERSHOOT[scene.body.kind]
         self._short = time_step / (1 + self._overshoot)
         self._pace(self._short)
         self._stretch, self._cells = made.stretch, made.cells

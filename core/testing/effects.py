@@ -2,26 +2,30 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
 from ..effect import ACTS_ON, Effect
 from ..errors import InputError
-from ..obstacles import Table
 from ..parameters import Parameter
-from ..rollout import rollout
 from ..simulator import CAPABILITIES, Simulator
 from . import hooks
 from .checks import Check, check_leaves_random_state, check_pickles, must, must_raise, raise_failures
-from .hooks import strongest, table_under
+from .hooks import strongest
 from .reference import ReferenceSimulator
-from .samples import KINDS, sample_grasp, sample_material, sample_scenario, sample_scene
+from .samples import KINDS
+from .stage import Meter, Stage
 
-#: A millionth of the range of every coefficient must not move anything by more than this [m].
-FADED = 1e-4
+#: Shares of the ranges of all coefficients that must not move anything by more than :data:`FADED`.
+FAINT = (1e-6, 3e-7, 1e-7)
+FADED = 1e-4  # [m]
+#: Share of the work either way that a dissipative effect may seem to do, as its forces are held through steps.
+GIVEN_BACK = 0.02
+#: Share of the ranges at which that is looked at.
+MODERATE = 0.3
+#: How many times as far as other trifles an effect may move an object whose contact amplifies everything.
+CHANCE = 3.0
 
 
 def check_effect(effect: type[Effect], simulator: Simulator | None = None) -> None:
@@ -50,8 +54,10 @@ def effect_checks(effect: type[Effect], simulator: Simulator | None = None) -> l
         if effect.dissipative:
             checks.append(Check(f"{kind}: never adds energy", partial(hooks.check_dissipative, effect, kind)))
         if not effect.needs - engine.capabilities:
-            for title, run in _ROLLOUTS.items():
-                checks.append(Check(f"{kind}: {title}", partial(run, effect, engine, kind)))
+            stage = Stage(engine, kind)
+            rollouts = {**_ROLLOUTS, **(_DISSIPATIVE if effect.dissipative else {})}
+            for title, run in rollouts.items():
+                checks.append(Check(f"{kind}: {title}", partial(run, effect, stage)))
     return checks
 
 
@@ -93,32 +99,65 @@ def check_pickled(effect: type[Effect]) -> None:
     must(type(copy) is effect and copy.values == one.values, "a pickled copy has other values")
 
 
-def check_zero(effect: type[Effect], simulator: Simulator, kind: str) -> None:
+def check_zero(effect: type[Effect], stage: Stage) -> None:
     """All coefficients zero leave the trajectory bit for bit."""
     zeros = effect(**{c.name: 0.0 for c in effect.coefficients})
-    same = np.array_equal(_path(simulator, kind), _path(simulator, kind, zeros))
+    same = np.array_equal(stage.plain, stage.path(zeros))
     must(same, "with all coefficients zero the trajectory differs from the one without the effect")
 
 
-def check_fades(effect: type[Effect], simulator: Simulator, kind: str) -> None:
-    """Coefficients near zero are nearly off: nothing jumps where the effect is switched on."""
-    weak = effect(**{name: 1e-6 * value for name, value in strongest(effect).items()})
-    apart = np.abs(_path(simulator, kind) - _path(simulator, kind, weak)).max()
-    must(apart < FADED, f"a millionth of its range moves a vertex by {apart:.2g} m, so zero is not its limit")
+def check_fades(effect: type[Effect], stage: Stage) -> None:
+    """Coefficients near zero are nearly off: nothing jumps where the effect is switched on.
+
+    The contact of some engines makes millimetres of a rounding error. There an effect may move the object on the
+    table by some times what other trifles do; it is then looked at without the table, too, where it may not.
+    """
+    nearly_off = [effect(**{n: share * value for n, value in strongest(effect).items()}) for share in FAINT]
+    apart = np.inf
+    for weak in nearly_off:
+        apart = min(apart, float(np.abs(stage.plain - stage.path(weak)).max()))
+        if apart < FADED:
+            return
+    allowed = FADED + CHANCE * stage.amplified
+    must(
+        apart < allowed,
+        f"a millionth of its range moves a vertex by {apart:.2g} m, so zero is not its limit; {allowed:.2g} m are "
+        "allowed on this simulator",
+    )
+    apart = float(np.abs(stage.in_the_air - stage.path(nearly_off[0], touching=False)).max())
+    must(apart < FADED, f"a millionth of its range moves a vertex by {apart:.2g} m in the air: zero is not its limit")
 
 
-def check_acts(effect: type[Effect], simulator: Simulator, kind: str) -> None:
+def check_takes_energy(effect: type[Effect], stage: Stage) -> None:
+    """Its forces never have done more work on the object, from its start at rest, than they have taken.
+
+    At :data:`MODERATE` strength: the samples are light and soft, and a force that is held through a step chatters
+    where it outdoes all others. At the end of its range the friction within a rope gives some of it back for a while.
+    """
+    meter = Meter(effect(**{name: MODERATE * value for name, value in strongest(effect).items()}))
+    stage.path(meter)
+    work, passed = np.cumsum(meter.work), np.cumsum(np.abs(meter.work))
+    excess = work - (GIVEN_BACK * passed + 1e-12)
+    if not (excess <= 0).all():
+        k = int(np.argmax(excess))
+        raise AssertionError(
+            f"it is dissipative, but after {k + 1} steps it has put {work[k]:.2g} J into the object, of "
+            f"{passed[k]:.2g} J that went either way"
+        )
+
+
+def check_acts(effect: type[Effect], stage: Stage) -> None:
     """At the ends of its ranges it does something, the same every time, also with one instance twice."""
     one = effect(**strongest(effect))
-    first = _path(simulator, kind, one)
+    first = stage.path(one)
     must(np.isfinite(first).all(), "the trajectory is not finite")
-    must(not np.array_equal(first, _path(simulator, kind)), f"with {one.values} the trajectory is the plain one")
-    must(np.array_equal(first, _path(simulator, kind, one)), "a second rollout of the same instance differs")
+    must(not np.array_equal(first, stage.plain), f"with {one.values} the trajectory is the plain one")
+    must(np.array_equal(first, stage.path(one)), "a second rollout of the same instance differs")
 
 
-def check_random_state(effect: type[Effect], simulator: Simulator, kind: str) -> None:
+def check_random_state(effect: type[Effect], stage: Stage) -> None:
     """The global random generators are left alone."""
-    check_leaves_random_state(lambda: _path(simulator, kind, effect(**strongest(effect))))
+    check_leaves_random_state(lambda: stage.path(effect(**strongest(effect))))
 
 
 _ONCE: dict[str, Callable[[type[Effect]], None]] = {
@@ -134,24 +173,13 @@ _HOOKS: dict[str, Callable[[type[Effect], str], None]] = {
     "what it binds is well-formed": hooks.check_force,
 }
 
-#: What is tried in rollouts: with the simulator, too.
-_ROLLOUTS: dict[str, Callable[[type[Effect], Simulator, str], None]] = {
+#: What is tried in rollouts.
+_ROLLOUTS: dict[str, Callable[[type[Effect], Stage], None]] = {
     "zero is exactly off": check_zero,
     "fades out towards zero": check_fades,
     "acts, and repeats": check_acts,
     "global random state untouched": check_random_state,
 }
 
-
-def _grasp(kind: str) -> tuple[IntArray, ...]:
-    """A solid is held by its upper side, or nothing that is free would touch the table."""
-    body = sample_scene(kind).body
-    return (np.argsort(body.vertices[:, 2])[-9:] if kind == "solid" else sample_grasp(body),)
-
-
-def _path(simulator: Simulator, kind: str, *effects: Effect) -> FloatArray:
-    """What is seen of the carried object, whose lowest part sags onto a table."""
-    scenario = replace(sample_scenario(kind), grasps=_grasp(kind))
-    lowest = float(scenario.start_vertices()[:, 2].min()) - float(scenario.body.vertices[:, 2].min())
-    table = Table(table_under(kind).height + lowest)
-    return rollout(simulator, replace(scenario, obstacles=(table,)), sample_material(kind), effects).series.points
+#: And if the effect is dissipative.
+_DISSIPATIVE: dict[str, Callable[[type[Effect], Stage], None]] = {"takes energy in a rollout": check_takes_energy}

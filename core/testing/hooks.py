@@ -121,9 +121,13 @@ def check_dissipative(effect: type[Effect], kind: str) -> None:
     """Whatever way the object is moved from rest, its force has never done more work on it than it took.
 
     In the sum over the path to each time, since a force that remembers, as that of internal friction, gives
-    back a part of what it took. What acts through the material may raise damping and friction alone.
+    back a part of what it took. What acts through the material may raise damping and friction alone, and no
+    other hook has a part in it.
     """
     one = effect(**strongest(effect))
+    for hook in ("on_gravity", "on_command", "on_loads", "bind_grasp"):
+        own = getattr(effect, hook) is not getattr(Effect, hook)
+        must(not own, f"it is dissipative, but acts through {hook}, which can add energy")
     material = sample_material(kind)
     before, after = vars(material), vars(one.on_material(material))
     for name, value in before.items():

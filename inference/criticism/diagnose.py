@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.errors import BrokenPluginError, InputError
 from ...core.parameters import ParameterSpace
-from ...core.powerless import why_powerless
 from ...core.registry import REGISTRY
 from ...core.rollout import Trajectory
 from ...core.store import put, read, storage_errors
@@ -18,13 +16,18 @@ from ..fitting import FitResult, load_fit, offsets_of
 from ..polish import Objective, Polished, polish
 from ..residuals import residual
 from .candidate import Candidate, best_starts, effect_start, responds, root_mean_square, screening_points, unchanged
+from .candidate_names import candidate_names
 from .sentences import explain
 from .verdict import Decision, Evidence, decide, has_misfit
 
 #: Effects that one diagnosis may name, one after the other.
 MOST_EFFECTS = 2
-#: Least-squares evaluations for every candidate, and for the most promising ones on top.
-FIRST_EVALUATIONS, MORE_EVALUATIONS = 4, 10
+#: Least-squares evaluations for every candidate, for the contenders on top, and for the most promising of these.
+FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, MORE_EVALUATIONS = 2, 4, 10
+#: Further starts from which the best candidate is polished.
+RESTARTS = 2
+#: How many of the candidates go on after the first look: with a dozen effects that act, most are far behind at once.
+CONTENDERS = 6
 #: The candidates that are polished to the end: this many, and all that explain half of what the best does.
 FINALISTS = 2
 
@@ -92,36 +95,6 @@ def diagnose(study: Study) -> Diagnosis:
     return Diagnosis(result, tuple(paragraphs))
 
 
-def candidate_names(study: Study) -> list[str]:
-    """The effects to try: those of the study file, or all installed ones that can act here and are not in yet.
-
-    Raises:
-        InputError: none is left, or one that the study names cannot act.
-        UnknownPluginError, BrokenPluginError: for one that the study names.
-    """
-    problem = study.problem
-    scenario = problem.scenarios[problem.fit_on[0]]
-    told = study.config.diagnose.candidates
-    names = told if told is not None else REGISTRY.names("effect")
-    out = []
-    for name in dict.fromkeys(names):
-        try:
-            effect = REGISTRY.get("effect", name)
-        except BrokenPluginError as error:
-            if told is not None:
-                raise
-            study.progress(f"left out: {error}", 0, 0)
-            continue
-        reason = why_powerless(effect, problem.simulator, scenario)
-        if told is not None and reason is not None:
-            raise InputError(f"[diagnose.candidates]: {reason}")
-        if name not in study.config.effects and reason is None:
-            out.append(name)
-    if not out:
-        raise InputError(f"{study.path}: no candidate effect is left to try; see: muslin plugins")
-    return out
-
-
 class _Work:
     """Everything that stages share."""
 
@@ -144,6 +117,7 @@ class _Work:
         for k, name in enumerate(names):
             self.study.progress(f"trying {name}", k + 1, len(names))
             candidates.append(self.refit((*effects, name), plain))
+        candidates = self.contend(effects, candidates)
         candidates = self.finish(effects, candidates, plain)
         best = min(candidates, key=lambda c: c.rss)
         if best.rss < plain.rss:
@@ -178,6 +152,17 @@ class _Work:
         first = polish(objective, best_starts(objective, points)[0], FIRST_EVALUATIONS)
         return Candidate(effects[-1], objective.space, base, first)
 
+    def contend(self, effects: tuple[str, ...], candidates: list[Candidate]) -> list[Candidate]:
+        """Polish the best of the first look further; the others stay as they are."""
+        out = []
+        for k, c in enumerate(sorted(candidates, key=lambda c: c.rss)):
+            if k < CONTENDERS:
+                self.study.progress(f"looking closer at {c.name}", k + 1, min(CONTENDERS, len(candidates)))
+                fit = polish(self.objective((*effects, c.name)), c.fit.unit, CONTENDER_EVALUATIONS)
+                c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
+            out.append(c)
+        return out
+
     def finish(self, effects: tuple[str, ...], candidates: list[Candidate], plain: Polished) -> list[Candidate]:
         """Polish the promising candidates to the end; the others are far behind and stay as they are."""
         order = sorted(candidates, key=lambda c: c.rss)
@@ -188,8 +173,18 @@ class _Work:
                 self.study.progress(f"refitting {c.name}", 0, 0)
                 fit = polish(self.objective((*effects, c.name)), c.fit.unit, MORE_EVALUATIONS)
                 c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
+                if k == 0:  # what the leader leaves would call for a second effect
+                    c = self.again(effects, c)
             out.append(c)
         return out
+
+    def again(self, effects: tuple[str, ...], c: Candidate) -> Candidate:
+        """Polish from other starts too, as a fit may have stopped in a side valley."""
+        objective = self.objective((*effects, c.name))
+        rng = np.random.default_rng([self.study.config.study.seed, 53, *c.name.encode()])
+        points = screening_points(c.space, c.base, c.fit.unit[None, : c.base], self.study.config.diagnose.draws, rng)
+        fits = [polish(objective, p, MORE_EVALUATIONS) for p in best_starts(objective, points)[:RESTARTS]]
+        return replace(c, fit=min([c.fit, *fits], key=lambda p: p.rss))
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
         values = space.as_dict(space.from_unit(unit))

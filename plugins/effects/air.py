@@ -33,6 +33,7 @@ class AirDrag(Effect):
         Parameter("drag_coefficient", "1", 0.0, 2.5, description="C_D broadside"),
         Parameter("lift_coefficient", "1", 0.0, 1.0, description="C_L"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "moves too fast through the air in the model, most where it moves broadside"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
@@ -63,6 +64,7 @@ class CylinderDrag(Effect):
         Parameter("drag_coefficient", "1", 0.0, 2.0, description="C_D across the rope"),
         Parameter("friction_coefficient", "1", 0.0, 0.05, description="C_f along the rope"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "moves too fast through the air in the model, most where it moves across its own length"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:

@@ -22,6 +22,7 @@ class ViscousDamping(Effect):
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("rate", "1/s", 0.0, 5.0, description="alpha of C = alpha M"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "keeps moving in the model where the real one comes to rest, slow motions and fast alike"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
@@ -46,6 +47,7 @@ class InternalDamping(Effect):
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("damping_time", "s", 0.0, 0.05, description="beta of C = beta K"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "keeps rippling in the model where the real one is calm, fast ripples most"
 
     def on_material(self, material: Material) -> Material:

@@ -35,6 +35,7 @@ class AnisotropicFriction(Effect):
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("excess", "1", -1.0, 1.0, description="of the friction along the warp, if negative along the weft"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "slides less readily along one family of its threads than along the other"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
@@ -70,6 +71,7 @@ class StickSlip(Effect):
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("excess", "1", 0.0, 1.0, description="of static over kinetic friction, mu_s / mu_k - 1"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "sticks where it lies and then lets go, where the model slides from the start"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
@@ -102,6 +104,7 @@ class CapstanFriction(Effect):
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("friction", "1", 0.0, 0.4, description="added to the Coulomb coefficient of the rope"),
     )
+    dissipative: ClassVar[bool] = True
     symptom: ClassVar[str] = "grips what it is wound around, where the model slips and loses tension less"
 
     def on_material(self, material: Material) -> Material:

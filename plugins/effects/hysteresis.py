@@ -19,6 +19,7 @@ _STEADY = 0.25
 
 class _Hysteresis(Effect):
     acts_on: ClassVar[str] = "force"
+    dissipative: ClassVar[bool] = True
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         return _Friction(bending_of(scene.body), self.values[self.coefficients[0].name], scene, masses)

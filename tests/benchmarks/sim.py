@@ -3,16 +3,18 @@
 (a) muslin's MuJoCo rollout against a bare ``mj_step`` loop of the same model under the same motion;
 (b) muslin's PyBullet rollout against a stock pybullet loop of the same mesh (stepSimulation at the same substep,
 getMeshData at every observation); (c) 2 worker processes against 1; (d) cost against vertices; (e) frames rendered
-a second::
+a second; (f) how far time steps are from small ones, and the engines from each other::
 
     make bench-sim
 """
 
 import argparse
 import statistics
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -100,7 +102,6 @@ def overhead(rows: list[Row], times: int) -> None:
 def stock_pybullet(scenario: Scenario, substep: float, substeps: int) -> float:
     """Seconds of the loop in pybullet's own deformable examples, on the same mesh, table and substep."""
     import pybullet as p
-    from muslin.backends.pybullet.meshfile import mesh_file
 
     scene = scenario.scene(MATERIAL, GRAVITY)
     client = p.connect(p.DIRECT)
@@ -112,7 +113,11 @@ def stock_pybullet(scenario: Scenario, substep: float, substeps: int) -> float:
             assert isinstance(table, Table)
             box = p.createCollisionShape(p.GEOM_BOX, halfExtents=[2, 2, 0.5], physicsClientId=client)
             p.createMultiBody(0, box, basePosition=[0, 0, table.height - 0.5], physicsClientId=client)
-        with mesh_file(scene.body) as path:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "cloth.obj")
+            points = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in scene.body.vertices]
+            faces = [f"f {a} {b} {c}" for a, b, c in scene.body.elements + 1]
+            path.write_text("\n".join([*points, *faces]) + "\n")
             cloth = p.loadSoftBody(
                 str(path),
                 mass=float(scene.body.measures.sum() * MATERIAL.areal_density),
@@ -195,7 +200,7 @@ def sizes(rows: list[Row]) -> None:
         for side in (9, 15, 21, 31):
             scenario = fling(side)
             short = replace(scenario, times=scenario.times[: round(0.3 * 30) + 1], settle=0.0)
-            seconds = min(timed(lambda s=short: rollout(simulator, s, MATERIAL)) for _ in range(2))
+            seconds = min(rollout(simulator, short, MATERIAL).seconds for _ in range(2))
             simulated = float(short.times[-1] - short.times[0])
             told = "s of computation a simulated second"
             rows.append(Row(f"(d) {engine}, {side * side} vertices", round(seconds / simulated, 2), told))
@@ -213,6 +218,22 @@ def rendering(rows: list[Row]) -> None:
             rows.append(Row(f"(e) renderer {name}, 320 x 320, {side * side} vertices", rate, "frames a second"))
 
 
+def time_steps(rows: list[Row]) -> None:
+    for name in ("fling", "swing"):
+        scenario = preset(name).scenario()
+        paths = {}
+        for step in (0.0005, 0.0025, 0.005):
+            made = rollout(REGISTRY.get("simulator", "mujoco")(time_step=step), scenario, MATERIAL)
+            paths[step] = made.vertices
+            if step > 0.0005:
+                apart = 1e3 * float(np.sqrt(np.mean(np.sum((made.vertices - paths[0.0005]) ** 2, axis=-1))))
+                rows.append(Row(f"(f) {name}, MuJoCo at {1e3 * step:g} ms from 0.5 ms", round(apart, 1), "mm RMS"))
+        other = rollout(REGISTRY.get("simulator", "pybullet")(), scenario, MATERIAL).vertices
+        for step, path in paths.items():
+            apart = 1e3 * float(np.sqrt(np.mean(np.sum((other - path) ** 2, axis=-1))))
+            rows.append(Row(f"(f) {name}, PyBullet from MuJoCo at {1e3 * step:g} ms", round(apart, 1), "mm RMS"))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--times", type=int, default=5, help="pairs of every comparison")
@@ -224,6 +245,7 @@ def main() -> None:
     scaling(rows, arguments.times)
     sizes(rows)
     rendering(rows)
+    time_steps(rows)
     report("sim", rows, [SEED], time.monotonic() - began)
 
 

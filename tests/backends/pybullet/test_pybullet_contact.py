@@ -7,6 +7,7 @@ pytest.importorskip("pybullet")
 
 from pybullet_scenes import GRAVITY, NOWHERE, flat, opened, run, scene
 
+from muslin.backends.pybullet.tables import Tables
 from muslin.core.body import cloth_grid, rope_line, solid_box
 from muslin.core.material import ClothMaterial, RopeMaterial, SolidMaterial
 from muslin.core.obstacles import Cylinder, StaticMesh, Table
@@ -40,6 +41,51 @@ def test_a_table_carries_the_weight_and_nothing_creeps(body, material):
         moved = world.state().positions - body.vertices
     np.testing.assert_allclose(force.sum(axis=0) / (world.masses.sum() * G), [0.0, 0.0, 1.0], atol=2e-3)
     assert np.abs(moved[body.vertices[:, 2] < 0.305]).max() < 2e-4
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, 50])
+@pytest.mark.parametrize("radius", [0.0, 0.004])
+def test_vertices_that_touch_together_each_do_what_one_alone_would(count, radius):
+    """On the surface at the end of the step, and slowed by mu times the push, or to rest."""
+    height, friction, time, rng = 0.7, 0.4, 3e-4, np.random.default_rng(count)
+    tables = Tables((Table(height, 0.8),), friction / 0.8, radius, 60)
+    try:
+        for _ in range(5):
+            gap = rng.uniform(0.0, 5e-5, count)
+            x = np.stack([*rng.uniform(-0.3, 0.3, (2, count)), height + radius + gap], axis=1)
+            v = np.stack([*rng.uniform(-0.3, 0.3, (2, count)), -rng.uniform(0.2, 0.4, count)], axis=1)
+            expected = v.copy()
+            expected[:, 2] = -gap / time
+            push, slide = expected[:, 2] - v[:, 2], np.hypot(v[:, 0], v[:, 1])
+            expected[:, :2] *= np.maximum(1.0 - friction * push / slide, 0.0)[:, None]
+            place, velocity = tables.step(x, v, time)
+            np.testing.assert_allclose(velocity, expected, atol=1e-9)
+            np.testing.assert_allclose(place, x + time * expected, atol=1e-12)
+    finally:
+        tables.close()
+
+
+def test_penetration_is_taken_back_without_a_bounce():
+    body = flat(cloth_grid(0.1, 0.1, 3, 3), 0.299)
+    with opened(scene(body, ClothMaterial(), obstacles=(Table(0.3),))) as world:
+        run(world, 0.2)
+        assert np.abs(world.state().positions[:, 2] - 0.3).max() < 1e-6
+        assert np.abs(world.state().velocities).max() < 1e-6
+
+
+def test_nearly_the_same_landing_is_nearly_the_same():
+    """A tilted sheet falls on its corner; 3e-11 m between two starts are no more than 1e-8 m at the end."""
+    sheet = flat(cloth_grid(0.2, 0.2, 7, 7))
+    tilted = sheet.vertices + np.outer(sheet.vertices @ [0.15, 0.1, 0.0], [0.0, 0.0, 1.0])
+    tilted[:, 2] += 0.005 - tilted[:, 2].min()
+    body = type(sheet)("cloth", tilted, sheet.elements)
+    noise = 3e-11 * np.random.default_rng(0).normal(size=tilted.shape)
+    ends = []
+    for start in (tilted, tilted + noise):
+        with opened(scene(body, ClothMaterial(), start=start, obstacles=(Table(0.0),))) as world:
+            ends.append(run(world, 0.25))
+            assert ends[-1][:, 2].min() > -1e-9
+    assert np.abs(ends[1] - ends[0]).max() < 1e-8
 
 
 @pytest.mark.parametrize(("body", "material"), OBJECTS[:2])

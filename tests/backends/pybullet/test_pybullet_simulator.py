@@ -12,12 +12,12 @@ import pytest
 
 pytest.importorskip("pybullet")
 
-from pybullet_scenes import NOWHERE, SMALL_CLOTH, opened, scene
+from pybullet_scenes import NOWHERE, SMALL_CLOTH, SMALL_ROPE, SMALL_SOLID, opened, scene
 
-from muslin.backends.pybullet import PybulletSimulator, library
+from muslin.backends.pybullet import PybulletSimulator, compiled, library
 from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.errors import BrokenPluginError, InputError, RolloutFailed
-from muslin.core.material import ClothMaterial, SolidMaterial
+from muslin.core.material import ClothMaterial, RopeMaterial, SolidMaterial
 from muslin.core.obstacles import Table
 
 
@@ -65,6 +65,34 @@ def test_missing_engine_is_explained(monkeypatch):
             PybulletSimulator().open(scene(SMALL_CLOTH, ClothMaterial()))
     finally:
         library.bullet.cache_clear()
+
+
+def test_missing_numba_is_explained(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    compiled._numba.cache_clear()
+    try:
+        with pytest.raises(BrokenPluginError, match=r"numba.*pip install muslin\[pybullet\]"):
+            compiled.compiled(abs, "anything")
+    finally:
+        compiled._numba.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("body", "material"),
+    [(SMALL_CLOTH, ClothMaterial(damping_time=1e-3)), (SMALL_SOLID, SolidMaterial()), (SMALL_ROPE, RopeMaterial())],
+    ids=["cloth", "solid", "rope"],
+)
+def test_one_version_is_compiled_for_whatever_arrays_come(body, material):
+    """Read-only or in Fortran's order: two versions in one file of the cache could be mixed up."""
+    frozen = np.asfortranarray(body.vertices)
+    elements = body.elements.copy()
+    for array in (frozen, elements):
+        array.flags.writeable = False
+    for one in (body, Body(body.kind, frozen, elements, body.grid)):
+        with opened(scene(one, material, held=np.array([0]), obstacles=(Table(-1.0),))) as world:
+            world.step(np.asfortranarray(frozen[:1]), np.asfortranarray(np.zeros_like(frozen)))
+            kernels = world._elasticity.kernels
+    assert [len(kernel.signatures) for kernel in kernels] == [1] * len(kernels)
 
 
 def test_opening_often_leaks_nothing():
