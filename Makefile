@@ -8,7 +8,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
-.PHONY: demo test lint bench bench-hidden-small bench-material clean
+.PHONY: demo test lint bench bench-hidden-small bench-material bench-sim clean
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -36,10 +36,13 @@ lint: $(VENV)/.ready-dev
 		ln -s "$(CURDIR)/$$part" build/types/muslin/$$part; done
 	cd build/types && MYPYPATH=. "$(CURDIR)/$(BIN)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p muslin
 
-bench: bench-hidden-small bench-material
+bench: bench-hidden-small bench-material bench-sim
 
 bench-hidden-small: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/hidden_small.py
+
+bench-sim: $(VENV)/.ready
+	$(BIN)/python tests/benchmarks/sim.py
 
 bench-material: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/material.py

@@ -1,17 +1,50 @@
 """Bending of sheets: a constant matrix for one that is flat at rest, hinges for any other."""
 
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import cache
+from typing import Any, NamedTuple
+
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
 from ...core.plate import bending_matrix
-from .sparse import Operator, from_dense, operator
+from .compiled import compiled
+from .hinges import hinge_form, hinges
+from .sparse import Rows, rows_of
 
-#: Share of the energy taken triangle by triangle instead of averaged over the triangles around a vertex.
-_UNAVERAGED = 0.1
+
+class BendingKernels(NamedTuple):
+    """Compiled for one kind of sheet; both set ``out (V, 3)``."""
+
+    kind: str
+    #: ``(data, positions, out)``: nodal forces [N], and remember the shape.
+    forces: Callable[[Any, FloatArray, FloatArray], None]
+    #: ``(data, motion, out)``: stiffness of that shape times a motion.
+    stiffness: Callable[[Any, FloatArray, FloatArray], None]
 
 
-class FlatBending:
+class Bending(ABC):
+    """What a sheet's bending adds."""
+
+    #: What the kernels work on.
+    data: Any
+    #: Own stiffness of every vertex ``(V,)`` [N/m].
+    diagonal: FloatArray
+
+    @staticmethod
+    @abstractmethod
+    def kernels() -> BendingKernels: ...
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Nodal forces ``(V, 3)`` [N]."""
+        out = np.empty(positions.shape)
+        self.kernels().forces(self.data, np.ascontiguousarray(positions), out)
+        return out
+
+
+class FlatBending(Bending):
     """Of a sheet that is flat at rest: force = -D Q x with the matrix of :func:`~muslin.core.plate.bending_matrix`.
 
     Args:
@@ -23,19 +56,58 @@ class FlatBending:
 
     def __init__(self, body: Body, rigidity: float, weft_ratio: float, held: IntArray) -> None:
         matrix = rigidity * bending_matrix(body, held, weft_ratio)
-        self.diagonal: FloatArray = np.diag(matrix).copy()
-        self._minus: Operator = from_dense(-matrix)
+        self.diagonal = np.diag(matrix).copy()
+        self.data = rows_of(matrix)
 
-    def forces(self, positions: FloatArray) -> FloatArray:
-        """Nodal forces ``(V, 3)`` [N]."""
-        return self._minus(positions)
-
-    def stiffness(self, motion: FloatArray) -> FloatArray:
-        """Stiffness times ``motion (V, 3)``."""
-        return -self._minus(motion)
+    @staticmethod
+    @cache
+    def kernels() -> BendingKernels:
+        return BendingKernels("flat", compiled(flat_forces, "flat"), compiled(flat_stiffness, "flat"))
 
 
-class CurvedBending:
+def flat_forces(data: Rows, positions: FloatArray, out: FloatArray) -> None:
+    """Set ``out`` to -D Q x."""
+    for i in range(len(out)):
+        x = y = z = 0.0
+        for entry in range(data.start[i], data.start[i + 1]):
+            j, value = data.columns[entry], data.values[entry]
+            x -= value * positions[j, 0]
+            y -= value * positions[j, 1]
+            z -= value * positions[j, 2]
+        out[i, 0], out[i, 1], out[i, 2] = x, y, z
+
+
+def flat_stiffness(data: Rows, motion: FloatArray, out: FloatArray) -> None:
+    """Set ``out`` to D Q x."""
+    for i in range(len(out)):
+        x = y = z = 0.0
+        for entry in range(data.start[i], data.start[i + 1]):
+            j, value = data.columns[entry], data.values[entry]
+            x += value * motion[j, 0]
+            y += value * motion[j, 1]
+            z += value * motion[j, 2]
+        out[i, 0], out[i, 1], out[i, 2] = x, y, z
+
+
+class HingeData(NamedTuple):
+    """Of N hinges.
+
+    Args:
+        hinges: the edge's ends and the corners beside it ``(N, 4)``.
+        rest: angles at rest ``(N,)``.
+        form: D times twice the energy as a form in the angles.
+        change: of the angles in the remembered shape ``(N,)``.
+        slopes: of the angles there, in the four vertices ``(N, 4, 3)`` [1/m].
+    """
+
+    hinges: IntArray
+    rest: FloatArray
+    form: Rows
+    change: FloatArray
+    slopes: FloatArray
+
+
+class CurvedBending(Bending):
     r"""Of a sheet of any rest shape, by the angles of its hinges.
 
     The energy of :func:`~muslin.core.plate.bending_matrix` with the change :math:`\theta - \theta_0` of every
@@ -54,161 +126,78 @@ class CurvedBending:
     """
 
     def __init__(self, body: Body, rigidity: float, weft_ratio: float, held: IntArray) -> None:
-        self._hinges, sides = _hinges(body)
-        hinges, count = self._hinges, len(self._hinges)
-        form = rigidity * _hinge_form(body, hinges, sides, weft_ratio, held)
-        self._rest = np.zeros(count)
-        self._rest = self._angles(body.vertices)
-        rows = np.broadcast_to(np.arange(4 * count).reshape(4, count), (4, count))
-        self._back: Operator = operator(hinges.T, rows, np.ones((4, count)), (len(body.vertices), 4 * count))
-        self._form = form
-        matrix = np.einsum("ahx,h,bhx->abh", self._slopes, np.abs(form).sum(axis=1), self._slopes)
-        own = np.einsum("aah->ha", matrix)
-        own_sum = np.bincount(hinges.ravel(), own.ravel(), minlength=len(body.vertices))
-        self.diagonal: FloatArray = np.asarray(own_sum, np.float64)
+        inner, sides = hinges(body)
+        count = len(inner)
+        form = rigidity * hinge_form(body, inner, sides, weft_ratio, held)
+        self.data = HingeData(inner, np.zeros(count), rows_of(form), np.zeros(count), np.zeros((count, 4, 3)))
+        self.forces(body.vertices)
+        self.data.rest[:] = self.data.change
+        own = np.abs(form).sum(axis=1)[:, None] * (self.data.slopes**2).sum(axis=2)
+        self.diagonal = np.asarray(np.bincount(inner.ravel(), own.ravel(), len(body.vertices)), np.float64)
 
-    def _angles(self, positions: FloatArray) -> FloatArray:
-        """Changes of angle ``(N,)``; the slopes of the angles are kept."""
-        a, b, c, d = (positions[self._hinges[:, k]] for k in range(4))
-        edge = b - a
-        size = np.sqrt(np.einsum("ij,ij->i", edge, edge))
-        along = edge / size[:, None]
-        first, second = np.cross(edge, c - a), np.cross(d - a, edge)
-        one, two = np.einsum("ij,ij->i", first, first), np.einsum("ij,ij->i", second, second)
-        np.maximum(one, 1e-9 * size**4, out=one)  # a collapsed triangle has no normal
-        np.maximum(two, 1e-9 * size**4, out=two)
-        sine = np.einsum("ij,ij->i", np.cross(second, first), along)
-        angles = np.arctan2(sine, np.einsum("ij,ij->i", first, second))
-        n1, n2 = first / one[:, None], second / two[:, None]
-        pc, pd = size[:, None] * n1, size[:, None] * n2
-        tc = np.einsum("ij,ij->i", c - a, along)[:, None]
-        td = np.einsum("ij,ij->i", d - a, along)[:, None]
-        towards_b = tc * n1 + td * n2
-        self._slopes = np.stack([towards_b - pc - pd, -towards_b, pc, pd])
-        change = angles - self._rest
-        return np.asarray(change - 2.0 * np.pi * np.round(change / (2.0 * np.pi)))
-
-    def forces(self, positions: FloatArray) -> FloatArray:
-        """Nodal forces ``(V, 3)`` [N]."""
-        moment = self._form @ self._angles(positions)
-        return self._back((-moment[:, None] * self._slopes).reshape(-1, 3))
-
-    def stiffness(self, motion: FloatArray) -> FloatArray:
-        """Stiffness times ``motion (V, 3)``."""
-        rate = np.einsum("ahx,ahx->h", self._slopes, motion[self._hinges.T])
-        return self._back(((self._form @ rate)[:, None] * self._slopes).reshape(-1, 3))
+    @staticmethod
+    @cache
+    def kernels() -> BendingKernels:
+        parts = {"moments": compiled(moments, "curved")}
+        return BendingKernels(
+            "curved", compiled(curved_forces, "curved", **parts), compiled(curved_stiffness, "curved", **parts)
+        )
 
 
-def _hinges(body: Body) -> tuple[IntArray, IntArray]:
-    """Inner edges with the corner left and the corner right of them ``(N, 4)``, and those triangles ``(N, 2)``.
-
-    Seen from where the first triangle runs counterclockwise; the other may run either way.
-    """
-    first: dict[tuple[int, int], tuple[int, int, int, int]] = {}
-    hinges, sides = [], []
-    for e, triangle in enumerate(body.elements.tolist()):
-        for i in range(3):
-            a, b, c = triangle[i], triangle[(i + 1) % 3], triangle[(i + 2) % 3]
-            key = (min(a, b), max(a, b))
-            if key in first:
-                p, q, r, other = first[key]
-                hinges.append([p, q, r, c])
-                sides.append([other, e])
-            else:
-                first[key] = (a, b, c, e)
-    return np.array(hinges, np.int64).reshape(-1, 4), np.array(sides, np.int64).reshape(-1, 2)
+def moments(data: HingeData, angles: FloatArray, sign: float, out: FloatArray) -> None:
+    """Set ``out (V, 3)`` to ``sign`` times the slopes times the form times ``angles (N,)``."""
+    out[:] = 0.0
+    for h in range(len(angles)):
+        moment = 0.0
+        for entry in range(data.form.start[h], data.form.start[h + 1]):
+            moment += data.form.values[entry] * angles[data.form.columns[entry]]
+        moment *= sign
+        for corner in range(4):
+            vertex = data.hinges[h, corner]
+            for k in range(3):
+                out[vertex, k] += moment * data.slopes[h, corner, k]
 
 
-def _hinge_form(body: Body, hinges: IntArray, sides: IntArray, weft_ratio: float, held: IntArray) -> FloatArray:
-    """Matrix ``(N, N)`` [1]: twice the bending energy over D as a form in the changes of angle."""
-    points, area = body.vertices, body.measures
-    corners = points[body.elements]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    rigid: BoolArray = np.all(np.isin(body.elements, held), axis=1)
-    warp = body.warp_directions(points)
-    by_triangle: list[list[tuple[int, int]]] = [[] for _ in area]
-    for h, pair in enumerate(sides.tolist()):
-        for e in pair:
-            by_triangle[e].append((h, pair[0]))
-    size = np.linalg.norm(points[hinges[:, 1]] - points[hinges[:, 0]], axis=1)
-    double = np.where(rigid[sides].any(axis=1), 2.0, 1.0)
-    rows: list[tuple[IntArray, FloatArray]] = []  # curvature (3, 3): what each hinge adds, as world tensors
-    for e, parts in enumerate(by_triangle):
-        which = np.array([h for h, _ in parts], np.int64)
-        # Seen from the first triangle of a hinge; a triangle wound the other way sees it with the other sign.
-        signs = np.array([1.0 if f == e or _agree(body, hinges[h], e) else -1.0 for h, f in parts])
-        edge = (points[hinges[which, 1]] - points[hinges[which, 0]]) / size[which, None]
-        across = np.cross(normal[e], edge)
-        tensor = np.einsum("h,hi,hj->hij", signs * double[which] * size[which] / (2 * area[e]), across, across)
-        rows.append((which, _without_free_edges(tensor, body, e, hinges[which], normal[e])))
-    form = np.zeros((len(hinges),) * 2)
-    root = np.array([weft_ratio**-0.125, weft_ratio**0.125])
-
-    def weighted(tensors: FloatArray, u: FloatArray, n: FloatArray) -> FloatArray:
-        frame = np.stack([u, np.cross(n, u)]) * root[:, None]
-        inside = np.einsum("ai,hij,bj->abh", frame, tensors, frame)
-        # The square sum of these four is S_uu^2 / sqrt r + S_vv^2 sqrt r + 2 S_uv^2.
-        return np.asarray(inside.reshape(4, -1))
-
-    for e, (which, tensor) in enumerate(rows):
-        part = weighted(tensor, warp[e], normal[e])
-        form[np.ix_(which, which)] += _UNAVERAGED * (0.0 if rigid[e] else area[e]) * part.T @ part
-    around: list[list[int]] = [[] for _ in points]
-    for e, triangle in enumerate(body.elements.tolist()):
-        for v in triangle:
-            around[v].append(e)
-    for near in around:
-        share = np.where(rigid[near], 0.0, area[near]) / 3.0
-        if not share.sum() > 0:
-            continue
-        facing = np.sign(normal[near] @ normal[near[0]])
-        facing[facing == 0] = 1.0
-        mean = (share * facing) @ normal[near]
-        mean /= np.linalg.norm(mean)
-        main = near[int(np.argmax(share))]
-        thread = _turned(normal[main] * facing[near.index(main)], mean) @ warp[main]
-        columns = np.unique(np.concatenate([rows[e][0] for e in near]))
-        total = np.zeros((len(columns), 3, 3))
-        for e, s, f in zip(near, share, facing, strict=True):
-            turn = _turned(f * normal[e], mean)
-            total[np.searchsorted(columns, rows[e][0])] += s * f * np.einsum("ia,hab,jb->hij", turn, rows[e][1], turn)
-        part = weighted(total, thread, mean)
-        form[np.ix_(columns, columns)] += (1 - _UNAVERAGED) / share.sum() * part.T @ part
-    return form
+def curved_forces(data: HingeData, positions: FloatArray, out: FloatArray) -> None:
+    """Set ``out`` to the forces."""
+    for h in range(len(data.hinges)):
+        a, b = positions[data.hinges[h, 0]], positions[data.hinges[h, 1]]
+        c, d = positions[data.hinges[h, 2]], positions[data.hinges[h, 3]]
+        square = (b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2
+        size = np.sqrt(square)
+        one = two = both = sine = along_c = along_d = 0.0
+        slopes = data.slopes[h]
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            first = (b[m] - a[m]) * (c[n] - a[n]) - (b[n] - a[n]) * (c[m] - a[m])
+            second = (d[m] - a[m]) * (b[n] - a[n]) - (d[n] - a[n]) * (b[m] - a[m])
+            slopes[2, k], slopes[3, k] = first, second  # normals, for now
+            one += first * first
+            two += second * second
+            both += first * second
+            along_c += (c[k] - a[k]) * (b[k] - a[k]) / size
+            along_d += (d[k] - a[k]) * (b[k] - a[k]) / size
+        for k in range(3):
+            m, n = (k + 1) % 3, (k + 2) % 3
+            turn = slopes[3, m] * slopes[2, n] - slopes[3, n] * slopes[2, m]
+            sine += turn * (b[k] - a[k]) / size
+        one, two = max(one, 1e-9 * square * square), max(two, 1e-9 * square * square)  # a collapsed one has no normal
+        change = np.arctan2(sine, both) - data.rest[h]
+        data.change[h] = change - 2.0 * np.pi * np.round(change / (2.0 * np.pi))
+        for k in range(3):
+            first, second = slopes[2, k] / one, slopes[3, k] / two
+            towards = along_c * first + along_d * second
+            slopes[0, k], slopes[1, k] = towards - size * (first + second), -towards
+            slopes[2, k], slopes[3, k] = size * first, size * second
+    moments(data, data.change, -1.0, out)
 
 
-def _agree(body: Body, hinge: IntArray, element: int) -> bool:
-    """Whether ``element`` runs through the edge of ``hinge`` against the first triangle, as on an oriented mesh."""
-    triangle = body.elements[element].tolist()
-    i = triangle.index(int(hinge[0]))
-    return bool(triangle[(i + 2) % 3] == int(hinge[1]))
-
-
-def _without_free_edges(
-    tensor: FloatArray, body: Body, element: int, hinges: IntArray, normal: FloatArray
-) -> FloatArray:
-    """Curvature across a free edge costs nothing: take it out of ``tensor (N, 3, 3)``."""
-    triangle = body.elements[element]
-    has = {tuple(sorted(h[:2].tolist())) for h in hinges}
-    free = []
-    for i in range(3):
-        a, b = int(triangle[i]), int(triangle[(i + 1) % 3])
-        if (min(a, b), max(a, b)) not in has:
-            edge = body.vertices[b] - body.vertices[a]
-            across = np.cross(normal, edge / np.linalg.norm(edge))
-            free.append(np.outer(across, across).ravel())
-    if not free:
-        return tensor
-    basis = np.linalg.qr(np.array(free).T)[0]
-    flat = tensor.reshape(len(tensor), 9)
-    return np.asarray((flat - flat @ basis @ basis.T).reshape(-1, 3, 3))
-
-
-def _turned(start: FloatArray, end: FloatArray) -> FloatArray:
-    """The smallest rotation ``(3, 3)`` that takes unit vector ``start`` to ``end``."""
-    axis, cosine = np.cross(start, end), float(start @ end)
-    if cosine < -0.999999:
-        return np.eye(3)
-    skew = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
-    return np.asarray(np.eye(3) + skew + skew @ skew / (1.0 + cosine))
+def curved_stiffness(data: HingeData, motion: FloatArray, out: FloatArray) -> None:
+    """Set ``out`` to the stiffness times ``motion (V, 3)``."""
+    rates = np.zeros(len(data.hinges))
+    for h in range(len(rates)):
+        for corner in range(4):
+            vertex = data.hinges[h, corner]
+            for k in range(3):
+                rates[h] += data.slopes[h, corner, k] * motion[vertex, k]
+    moments(data, rates, 1.0, out)

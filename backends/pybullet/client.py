@@ -8,14 +8,16 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray
 from ...core.errors import RolloutFailed
 from .library import bullet
-from .meshfile import node_file
+from .meshfile import HUB, node_file
 
 _DEFORMABLE_WORLD = 1
 _SOFT_BODY_LOADED = 99
 _NEVER_SLEEP = 2
+#: Height at which nodes are out of reach of everything [m].
+_AWAY = 1000.0
 _UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 _REAL_SIZE = ctypes.sizeof(ctypes.c_double)
 
@@ -53,7 +55,7 @@ class Client:
         self.api = bullet()
         self.handle: int | None = self.api.b3ConnectPhysicsDirect()
         self._soft = -1
-        self._nodes = 0
+        self._parked = self._places = self._speeds = np.zeros((0, 3))
         self._data = _MeshData()
         self._time_step = 0.0
         command = self.api.b3InitResetSimulationCommand(self.handle)
@@ -100,17 +102,16 @@ class Client:
         api.b3ChangeDynamicsInfoSetLateralFriction(command, body, -1, friction)
         self._submit(command)
 
-    def load(self, count: int, mass: float, margin: float) -> None:
-        """Load ``count`` nodes that share ``mass`` [kg] equally and keep ``margin`` [m] away from shapes.
+    def load(self, count: int, margin: float) -> None:
+        """Load ``count`` nodes that keep ``margin`` [m] away from shapes, out of their reach for now.
 
         Raises:
             RolloutFailed: Bullet refuses the file or reads another number of nodes from it.
         """
         api = self.api
-        nodes = max(count, 3)
-        with node_file(nodes) as path:
+        with node_file(count) as path:
             command = api.b3LoadSoftBodyCommandInit(self.handle, os.fsencode(path))
-            api.b3LoadSoftBodySetMass(command, mass)
+            api.b3LoadSoftBodySetMass(command, 1.0)
             api.b3LoadSoftBodySetCollisionMargin(command, margin)
             api.b3LoadSoftBodyUseFaceContact(command, 0)
             # Bullet multiplies the coefficients of the two bodies: the obstacles carry the real one.
@@ -120,59 +121,55 @@ class Client:
                 status = self._submit(command)
         if api.b3GetStatusType(status) != _SOFT_BODY_LOADED:
             raise RolloutFailed("Bullet refused to load the nodes")
-        self._soft, self._nodes = api.b3GetStatusBodyIndex(status), nodes
+        self._soft = api.b3GetStatusBodyIndex(status)
+        nodes = count + HUB
+        self._parked = np.stack([0.01 * np.arange(nodes), 0.01 * (np.arange(nodes) % 2), np.full(nodes, _AWAY)], axis=1)
+        self._places, self._speeds = self._parked.copy(), np.zeros((nodes, 3))
         command = api.b3InitChangeDynamicsInfo(self.handle)
         api.b3ChangeDynamicsInfoSetActivationState(command, self._soft, _NEVER_SLEEP)
         self._submit(command)
-        self._read(velocity=False, out=np.empty((nodes, 4)))
+        self.set_positions(self._parked[:0])
+        self.positions(count)
 
-    def fix(self, vertices: IntArray) -> None:
-        """Make ``vertices`` infinitely heavy; they then move with the velocity they are given."""
-        origin = np.zeros(3)
-        for vertex in vertices:
-            self._submit(
-                self.api.b3InitCreateSoftBodyAnchorConstraintCommand(
-                    self.handle, self._soft, int(vertex), -1, -1, address(origin)
-                )
-            )
-
-    def _read(self, velocity: bool, out: FloatArray) -> None:
-        """Copy to ``out (V, 4)``: Bullet's vectors have a fourth, unused component."""
-        api, data = self.api, self._data
+    def _read(self, count: int, velocity: bool) -> FloatArray:
+        """Of the first ``count`` nodes ``(count, 3)``; Bullet's vectors have a fourth, unused component."""
+        api, data, out = self.api, self._data, np.empty((count, 4))
         command = api.b3GetMeshDataCommandInit(self.handle, self._soft, -1)
         api.b3GetMeshDataSimulationMesh(command)
         if velocity:
             api.b3MeshDataSimulationMeshVelocity(command)
         self._submit(command)
         api.b3GetMeshData(self.handle, ctypes.byref(data))
-        if data.count != self._nodes:
-            raise RolloutFailed(f"Bullet has {data.count} nodes instead of {self._nodes}")
-        ctypes.memmove(address(out), data.vertices, 4 * _REAL_SIZE * len(out))
+        if data.count != len(self._places):
+            raise RolloutFailed(f"Bullet has {data.count} nodes instead of {len(self._places)}")
+        ctypes.memmove(address(out), data.vertices, 4 * _REAL_SIZE * count)
+        return out[:, :3]
 
-    def read_positions(self, out: FloatArray) -> None:
-        """Copy positions [m] to the first three columns of ``out (V, 4)``."""
-        self._read(False, out)
+    def positions(self, count: int) -> FloatArray:
+        """Of the first ``count`` nodes ``(count, 3)`` [m]."""
+        return self._read(count, velocity=False)
 
-    def read_velocities(self, out: FloatArray) -> None:
-        """Copy velocities [m/s] to the first three columns of ``out (V, 4)``."""
-        self._read(True, out)
+    def velocities(self, count: int) -> FloatArray:
+        """Of the first ``count`` nodes ``(count, 3)`` [m/s]."""
+        return self._read(count, velocity=True)
 
     def _write(self, values: FloatArray, velocity: bool) -> None:
-        values = np.ascontiguousarray(values, dtype=np.float64)
-        if len(values) < self._nodes:  # what is missing follows the last vertex
-            values = np.concatenate([values, np.repeat(values[-1:], self._nodes - len(values), axis=0)])
-        command = self.api.b3ResetMeshDataCommandInit(self.handle, self._soft, self._nodes, address(values))
+        command = self.api.b3ResetMeshDataCommandInit(self.handle, self._soft, len(values), address(values))
         if velocity:
             self.api.b3MeshDataSimulationMeshVelocity(command)
         self._submit(command)
 
     def set_positions(self, positions: FloatArray) -> None:
-        """Move every vertex to ``(V, 3)`` [m]; velocities stay."""
-        self._write(positions, velocity=False)
+        """Put the first nodes at ``(N, 3)`` [m] and all others out of reach."""
+        count = len(positions)
+        self._places[:count], self._places[count:] = positions, self._parked[count:]
+        self._write(self._places, velocity=False)
 
     def set_velocities(self, velocities: FloatArray) -> None:
-        """Give every vertex a velocity ``(V, 3)`` [m/s]."""
-        self._write(velocities, velocity=True)
+        """Give the first nodes velocities ``(N, 3)`` [m/s] and let all others rest."""
+        count = len(velocities)
+        self._speeds[:count], self._speeds[count:] = velocities, 0.0
+        self._write(self._speeds, velocity=True)
 
     def step(self) -> None:
         """Advance by the time step."""

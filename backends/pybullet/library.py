@@ -39,7 +39,6 @@ _FUNCTIONS: tuple[tuple[str, Any, tuple[Any, ...]], ...] = (
     ("b3LoadSoftBodySetFrictionCoefficient", _INT, (_ADDRESS, _REAL)),
     ("b3LoadSoftBodyUseFaceContact", _INT, (_ADDRESS, _INT)),
     ("b3LoadSoftBodyAddMassSpringForce", _INT, (_ADDRESS, _REAL, _REAL)),
-    ("b3InitCreateSoftBodyAnchorConstraintCommand", _ADDRESS, (_ADDRESS, _INT, _INT, _INT, _INT, _ADDRESS)),
     ("b3GetMeshDataCommandInit", _ADDRESS, (_ADDRESS, _INT, _INT)),
     ("b3GetMeshDataSimulationMesh", None, (_ADDRESS,)),
     ("b3MeshDataSimulationMeshVelocity", None, (_ADDRESS,)),

@@ -1,25 +1,36 @@
 """Sheets: constant-strain triangles of orthotropic Saint Venant-Kirchhoff material, and their bending."""
 
-from typing import Protocol
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
 from ...core.material import ClothMaterial
-from .elasticity import Elasticity
-from .sparse import Operator, operator
+from .bending import Bending
+from .compiled import compiled
+from .elasticity import Elasticity, Kernels, kernels
 
 
-class Bending(Protocol):
-    """What a sheet's bending adds."""
+class MembraneData(NamedTuple):
+    """Of E triangles.
 
-    #: Own stiffness of every vertex ``(V,)`` [N/m].
-    diagonal: FloatArray
+    Args:
+        corners: ``(E, 3)``.
+        gradients: from corners to the derivatives along warp and weft ``(E, 2, 3)`` [1/m].
+        area: ``(E,)`` [m2], times the factor on the stretch stiffness.
+        moduli: C_uu, C_uv, C_vv and C_ss ``(4,)`` [N/m].
+        shape: the two derivatives of the remembered shape ``(E, 2, 3)``.
+        bending: of the same sheet.
+    """
 
-    def forces(self, positions: FloatArray) -> FloatArray: ...
-
-    def stiffness(self, motion: FloatArray) -> FloatArray: ...
+    corners: IntArray
+    gradients: FloatArray
+    area: FloatArray
+    moduli: FloatArray
+    shape: FloatArray
+    bending: Any
 
 
 class Membrane(Elasticity):
@@ -43,6 +54,7 @@ class Membrane(Elasticity):
     """
 
     def __init__(self, body: Body, material: ClothMaterial, bending: Bending) -> None:
+        self.kernels = _kernels(type(bending))
         corners = body.vertices[body.elements]
         edges = corners[:, 1:] - corners[:, :1]
         warp = body.warp_directions(body.vertices)
@@ -50,57 +62,92 @@ class Membrane(Elasticity):
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         inverse = np.linalg.inv(edges @ np.stack([warp, np.cross(normal, warp)], axis=2))
         gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-        count, size = len(body.elements), len(body.vertices)
-        rows = np.arange(2 * count).reshape(2, count).T[:, :, None]
-        columns = np.broadcast_to(body.elements[:, None, :], gradients.shape)
-        #: From positions to F: first all derivatives along the warp, then all along the weft.
-        self._forward: Operator = operator(
-            np.broadcast_to(rows, gradients.shape), columns, gradients, (2 * count, size)
-        )
-        self._back: Operator = operator(columns, np.broadcast_to(rows, gradients.shape), gradients, (size, 2 * count))
         s, nu, root = material.stretch_stiffness, material.poisson_ratio, np.sqrt(material.weft_stretch_ratio)
-        self._moduli = np.array([[s / root, nu * s, 0.0], [nu * s, s * root, 0.0], [0.0, 0.0, 0.0]]) / (1.0 - nu**2)
-        self._moduli[2, 2] = s / (2.0 * (1.0 + nu))
-        # Stress as moduli times (F_u.F_u, F_v.F_v, F_u.F_v) less what that is at rest.
-        self._half_moduli = self._moduli * np.array([0.5, 0.5, 1.0])
-        self._prestress = self._half_moduli @ np.array([[1.0], [1.0], [0.0]])
-        self._area, self._weight = body.measures, body.measures
-        self._bending = bending
-        self._count = count
-        self._strain = np.empty((3, count))
-        steep = (gradients**2).sum(axis=1) * (body.measures * np.linalg.eigvalsh(self._moduli)[-1] * 1.5)[:, None]
-        self.diagonal = bending.diagonal + np.bincount(body.elements.ravel(), steep.ravel(), minlength=size)
+        moduli = np.array([s / root, nu * s, s * root, s * (1.0 - nu) / 2.0]) / (1.0 - nu**2)
+        self._area = body.measures
+        self.data = MembraneData(
+            np.array(body.elements, np.int64, order="C"),
+            np.ascontiguousarray(gradients),
+            np.array(self._area, order="C"),
+            moduli,
+            np.zeros((len(edges), 2, 3)),
+            bending.data,
+        )
+        highest = np.linalg.eigvalsh([[moduli[0], moduli[1], 0], [moduli[1], moduli[2], 0], [0, 0, moduli[3]]])[-1]
+        steep = (gradients**2).sum(axis=1) * (self._area * highest * 1.5)[:, None]
+        self.diagonal = bending.diagonal + np.bincount(body.elements.ravel(), steep.ravel(), len(body.vertices))
 
     def scale_stretch(self, factor: FloatArray | None) -> None:
-        self._weight = self._area if factor is None else self._area * factor
+        self.data.area[:] = self._area if factor is None else self._area * factor
 
-    def forces(self, positions: FloatArray) -> FloatArray:
-        shape = self._forward(positions)
-        self._u, self._v = shape[: self._count], shape[self._count :]
-        e = self._strain
-        np.einsum("ij,ij->i", self._u, self._u, out=e[0])
-        np.einsum("ij,ij->i", self._v, self._v, out=e[1])
-        np.einsum("ij,ij->i", self._u, self._v, out=e[2])
-        stress = self._half_moduli @ e
-        stress -= self._prestress
-        return self._bending.forces(positions) - self._pull(stress)
 
-    def stiffness(self, motion: FloatArray) -> FloatArray:
-        rate = self._forward(motion)
-        u, v, e = rate[: self._count], rate[self._count :], self._strain
-        np.einsum("ij,ij->i", self._u, u, out=e[0])
-        np.einsum("ij,ij->i", self._v, v, out=e[1])
-        np.einsum("ij,ij->i", self._u, v, out=e[2])
-        e[2] += np.einsum("ij,ij->i", self._v, u)
-        return self._bending.stiffness(motion) + self._pull(self._moduli @ e)
+@cache
+def _kernels(bending: type[Bending]) -> Kernels:
+    own = bending.kernels()
+    return kernels(
+        own.kind,
+        compiled(membrane_forces, own.kind, bending_forces=own.forces),
+        compiled(membrane_stiffness, own.kind, bending_stiffness=own.stiffness),
+    )
 
-    def _pull(self, stress: FloatArray) -> FloatArray:
-        """What ``stress (3, E)`` [N/m] does to the vertices."""
-        stress *= self._weight
-        first, second, shear = stress[0][:, None], stress[1][:, None], stress[2][:, None]
-        load = np.empty((2 * self._count, 3))
-        np.multiply(self._u, first, out=load[: self._count])
-        load[: self._count] += shear * self._v
-        np.multiply(self._v, second, out=load[self._count :])
-        load[self._count :] += shear * self._u
-        return self._back(load)
+
+def bending_forces(data: Any, positions: FloatArray, out: FloatArray) -> None:
+    """Stands for that of the bending, which is compiled in."""
+    raise NotImplementedError
+
+
+def bending_stiffness(data: Any, motion: FloatArray, out: FloatArray) -> None:
+    """Stands for that of the bending, which is compiled in."""
+    raise NotImplementedError
+
+
+def membrane_forces(data: MembraneData, positions: FloatArray, out: FloatArray) -> None:
+    """Elastic nodal forces ``out (V, 3)`` [N]."""
+    bending_forces(data.bending, positions, out)
+    c_uu, c_uv, c_vv, c_ss = data.moduli[0], data.moduli[1], data.moduli[2], data.moduli[3]
+    for e in range(len(data.corners)):
+        a, b, c = data.corners[e, 0], data.corners[e, 1], data.corners[e, 2]
+        g, shape = data.gradients[e], data.shape[e]
+        uu = vv = uv = 0.0
+        for k in range(3):
+            u = g[0, 0] * positions[a, k] + g[0, 1] * positions[b, k] + g[0, 2] * positions[c, k]
+            v = g[1, 0] * positions[a, k] + g[1, 1] * positions[b, k] + g[1, 2] * positions[c, k]
+            shape[0, k], shape[1, k] = u, v
+            uu += u * u
+            vv += v * v
+            uv += u * v
+        first, second = 0.5 * (uu - 1.0), 0.5 * (vv - 1.0)
+        area = data.area[e]
+        warp, weft = area * (c_uu * first + c_uv * second), area * (c_uv * first + c_vv * second)
+        shear = area * c_ss * uv
+        for k in range(3):
+            along = warp * shape[0, k] + shear * shape[1, k]
+            across = weft * shape[1, k] + shear * shape[0, k]
+            out[a, k] -= g[0, 0] * along + g[1, 0] * across
+            out[b, k] -= g[0, 1] * along + g[1, 1] * across
+            out[c, k] -= g[0, 2] * along + g[1, 2] * across
+
+
+def membrane_stiffness(data: MembraneData, motion: FloatArray, out: FloatArray) -> None:
+    """Stiffness times ``motion (V, 3)``."""
+    bending_stiffness(data.bending, motion, out)
+    c_uu, c_uv, c_vv, c_ss = data.moduli[0], data.moduli[1], data.moduli[2], data.moduli[3]
+    for e in range(len(data.corners)):
+        a, b, c = data.corners[e, 0], data.corners[e, 1], data.corners[e, 2]
+        g, shape = data.gradients[e], data.shape[e]
+        first = second = both = 0.0
+        for k in range(3):
+            u = g[0, 0] * motion[a, k] + g[0, 1] * motion[b, k] + g[0, 2] * motion[c, k]
+            v = g[1, 0] * motion[a, k] + g[1, 1] * motion[b, k] + g[1, 2] * motion[c, k]
+            first += shape[0, k] * u
+            second += shape[1, k] * v
+            both += shape[0, k] * v + shape[1, k] * u
+        area = data.area[e]
+        warp, weft = area * (c_uu * first + c_uv * second), area * (c_uv * first + c_vv * second)
+        shear = area * c_ss * both
+        for k in range(3):
+            along = warp * shape[0, k] + shear * shape[1, k]
+            across = weft * shape[1, k] + shear * shape[0, k]
+            out[a, k] += g[0, 0] * along + g[1, 0] * across
+            out[b, k] += g[0, 1] * along + g[1, 1] * across
+            out[c, k] += g[0, 2] * along + g[1, 2] * across

@@ -1,16 +1,44 @@
 """Ropes: stretching and bending of a discrete elastic rod that may twist freely."""
 
+from functools import cache
+from typing import NamedTuple
+
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
 from ...core.body import Body
 from ...core.material import RopeMaterial
-from .elasticity import Elasticity
+from .compiled import compiled
+from .elasticity import Elasticity, Kernels, kernels
 
 #: Rest curvature is rounded off by this share of itself, so that a straightened vertex has a finite frequency.
 _ROUNDING = 0.1
 #: Turn of a vertex [1] beyond which rotating the plane of its bend is no longer taken for bending.
 _STRAIGHT = 0.02
+
+
+class RodData(NamedTuple):
+    """Of E segments and N inner vertices.
+
+    Args:
+        rest: lengths ``(E,)`` [m].
+        axial: EA over length ``(E,)`` [N/m].
+        bending: EI over length ``(N,)`` [N m].
+        turn: angles at rest ``(N,)``, rounded off.
+        round: squares of the rounding ``(N,)``.
+        unit: directions of the segments ``(E, 3)`` of the remembered shape.
+        inverse: of their lengths there ``(E,)`` [1/m].
+        turned: sine and cosine of the angles there ``(N, 2)``.
+    """
+
+    rest: FloatArray
+    axial: FloatArray
+    bending: FloatArray
+    turn: FloatArray
+    round: FloatArray
+    unit: FloatArray
+    inverse: FloatArray
+    turned: FloatArray
 
 
 class Rod(Elasticity):
@@ -36,99 +64,112 @@ class Rod(Elasticity):
     """
 
     def __init__(self, body: Body, material: RopeMaterial, held: IntArray) -> None:
-        edges = np.diff(body.vertices, axis=0)
-        self._rest = body.measures
-        self._plain = material.stretch_stiffness / self._rest
-        self._axial = self._plain
+        self.kernels = _kernels()
+        rest = np.array(body.measures, np.float64)
+        unit = np.diff(body.vertices, axis=0) / rest[:, None]
         clamped: BoolArray = np.all(np.isin(body.elements, held), axis=1)
-        half = clamped[:-1] ^ clamped[1:]
-        mean = 0.5 * (self._rest[:-1] + self._rest[1:])
-        self._bending = material.bending_rigidity / mean * np.where(half, 2.0, 1.0)
-        unit = edges / self._rest[:, None]
-        turn = _angle(unit)[0]
+        mean = 0.5 * (rest[:-1] + rest[1:])
+        bending = material.bending_rigidity / mean * np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
+        turn = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(unit, axis=0), axis=1), 0.0, 1.0))
         turn[turn < 1e-6] = 0.0
-        self._curved = bool(turn.any())
-        self._round = (_ROUNDING * turn) ** 2 + 1e-12
-        self._turn = np.sqrt(turn**2 + self._round) * (turn > 0)
-        sides = self._bending * (1.0 / self._rest[:-1] + 1.0 / self._rest[1:]) ** 2
-        self.diagonal = np.zeros(len(body.vertices))
-        self.diagonal[1:-1] += sides
-        self.diagonal[:-2] += self._bending / self._rest[:-1] ** 2
-        self.diagonal[2:] += self._bending / self._rest[1:] ** 2
-        self._bending_diagonal = self.diagonal
+        rounding = (_ROUNDING * turn) ** 2 + 1e-12
+        self._plain = material.stretch_stiffness / rest
+        self.data = RodData(
+            rest,
+            self._plain.copy(),
+            bending,
+            np.sqrt(turn**2 + rounding) * (turn > 0),
+            rounding,
+            np.zeros((len(rest), 3)),
+            np.zeros(len(rest)),
+            np.zeros((len(turn), 2)),
+        )
+        self._bending_diagonal = np.zeros(len(body.vertices))
+        self._bending_diagonal[1:-1] += bending * (1.0 / rest[:-1] + 1.0 / rest[1:]) ** 2
+        self._bending_diagonal[:-2] += bending / rest[:-1] ** 2
+        self._bending_diagonal[2:] += bending / rest[1:] ** 2
         self.scale_stretch(None)
 
     def scale_stretch(self, factor: FloatArray | None) -> None:
-        self._axial = self._plain if factor is None else self._plain * factor
+        axial = self.data.axial
+        axial[:] = self._plain if factor is None else self._plain * factor
         self.diagonal = self._bending_diagonal.copy()
-        self.diagonal[:-1] += self._axial
-        self.diagonal[1:] += self._axial
-
-    def forces(self, positions: FloatArray) -> FloatArray:
-        edges = positions[1:] - positions[:-1]
-        length = np.sqrt(np.einsum("ij,ij->i", edges, edges))
-        inverse = (1.0 / length)[:, None]
-        unit = edges * inverse
-        u, v = unit[:-1], unit[1:]
-        angle, sine, cosine = _angle(unit)
-        pull = self._bending * angle / sine
-        if self._curved:
-            pull *= 1.0 - self._turn / np.sqrt(angle * angle + self._round)
-        self._unit, self._inverse, self._sine, self._cosine = unit, inverse, sine, cosine
-        self._bends: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
-        load = unit * (self._axial * (length - self._rest))[:, None]
-        along = cosine[:, None]
-        pull = pull[:, None]
-        load[:-1] -= pull * inverse[:-1] * (v - along * u)
-        load[1:] -= pull * inverse[1:] * (u - along * v)
-        return _ends(load)
-
-    def stiffness(self, motion: FloatArray) -> FloatArray:
-        if self._bends is None:
-            self._bends = self._planes()
-        m, n, flat, straight = self._bends
-        unit, inverse = self._unit, self._inverse
-        moved = motion[1:] - motion[:-1]
-        along = np.einsum("ij,ij->i", unit, moved)[:, None]
-        load = unit * (self._axial[:, None] * along)
-        rate = np.einsum("ij,ij->i", m, moved[:-1])
-        rate += np.einsum("ij,ij->i", n, moved[1:])
-        bent = (flat * rate)[:, None]
-        load[:-1] += bent * m
-        load[1:] += bent * n
-        turned = (moved - unit * along) * inverse
-        out = straight * (turned[1:] - turned[:-1])
-        u, v = unit[:-1], unit[1:]
-        load[:-1] -= inverse[:-1] * (out - u * np.einsum("ij,ij->i", u, out)[:, None])
-        load[1:] += inverse[1:] * (out - v * np.einsum("ij,ij->i", v, out)[:, None])
-        return -_ends(load)
-
-    def _planes(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Of the last shape, what :meth:`stiffness` needs.
-
-        The angle's rate is -(m.u' + n.v') for motions u', v' of a vertex's two segments, with ``m, n (N, 3)`` in the
-        plane of the bend; the stiffness ``(N,)`` against it; and against any other turn ``(N, 1)``, as long as
-        there is hardly a plane.
-        """
-        u, v, cosine = self._unit[:-1], self._unit[1:], self._cosine[:, None]
-        m = (v - cosine * u) / self._sine[:, None] * self._inverse[:-1]
-        n = (u - cosine * v) / self._sine[:, None] * self._inverse[1:]
-        straight = self._bending / (1.0 + (self._sine / _STRAIGHT) ** 2)
-        return m, n, self._bending - straight, straight[:, None]
+        self.diagonal[:-1] += axial
+        self.diagonal[1:] += axial
 
 
-def _angle(unit: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Angles ``(N,)`` between consecutive ``unit (N + 1, 3)`` vectors, their sines (never zero) and cosines."""
-    apart = unit[1:] - unit[:-1]
-    square = np.einsum("ij,ij->i", apart, apart)  # of 2 sin(angle / 2)
-    half = 0.5 * np.sqrt(square)
-    np.clip(half, 1e-9, 1.0 - 1e-9, out=half)
-    return 2.0 * np.arcsin(half), 2.0 * half * np.sqrt(1.0 - half * half), 1.0 - 0.5 * square
+@cache
+def _kernels() -> Kernels:
+    return kernels("rope", compiled(rod_forces, "rope"), compiled(rod_stiffness, "rope"))
 
 
-def _ends(load: FloatArray) -> FloatArray:
-    """Nodal forces ``(V, 3)`` of segments that pull their ends together by ``load (E, 3)``."""
-    forces = np.empty((len(load) + 1, 3))
-    forces[0], forces[-1] = load[0], -load[-1]
-    np.subtract(load[1:], load[:-1], out=forces[1:-1])
-    return forces
+def rod_forces(data: RodData, positions: FloatArray, out: FloatArray) -> None:
+    """Elastic nodal forces ``out (V, 3)`` [N]."""
+    unit, inverse = data.unit, data.inverse
+    out[:] = 0.0
+    for e in range(len(unit)):
+        square = 0.0
+        for k in range(3):
+            unit[e, k] = positions[e + 1, k] - positions[e, k]
+            square += unit[e, k] * unit[e, k]
+        length = np.sqrt(square)
+        inverse[e] = 1.0 / length
+        tension = data.axial[e] * (length - data.rest[e])
+        for k in range(3):
+            unit[e, k] *= inverse[e]
+            out[e, k] += tension * unit[e, k]
+            out[e + 1, k] -= tension * unit[e, k]
+    for n in range(len(data.bending)):
+        u, v = unit[n], unit[n + 1]
+        square = 0.0  # of 2 sin(angle / 2)
+        for k in range(3):
+            square += (v[k] - u[k]) ** 2
+        half = min(max(0.5 * np.sqrt(square), 1e-9), 1.0 - 1e-9)
+        angle, sine, cosine = 2.0 * np.arcsin(half), 2.0 * half * np.sqrt(1.0 - half * half), 1.0 - 0.5 * square
+        data.turned[n, 0], data.turned[n, 1] = sine, cosine
+        pull = data.bending[n] * angle / sine
+        if data.turn[n] > 0:
+            pull *= 1.0 - data.turn[n] / np.sqrt(angle * angle + data.round[n])
+        for k in range(3):
+            first = pull * inverse[n] * (v[k] - cosine * u[k])
+            second = pull * inverse[n + 1] * (u[k] - cosine * v[k])
+            out[n, k] -= first
+            out[n + 1, k] += first - second
+            out[n + 2, k] += second
+
+
+def rod_stiffness(data: RodData, motion: FloatArray, out: FloatArray) -> None:
+    """Stiffness times ``motion (V, 3)``.
+
+    The angle's rate is -(m.u' + n.v') for motions u', v' of a vertex's two segments, with m and n in the plane of
+    the bend. Any other turn is taken for bending as long as there is hardly a plane.
+    """
+    unit, inverse = data.unit, data.inverse
+    out[:] = 0.0
+    turned = np.empty_like(unit)  # rates of the directions
+    for e in range(len(unit)):
+        along = 0.0
+        for k in range(3):
+            turned[e, k] = motion[e + 1, k] - motion[e, k]
+            along += unit[e, k] * turned[e, k]
+        for k in range(3):
+            pull = data.axial[e] * along * unit[e, k]
+            out[e, k] -= pull
+            out[e + 1, k] += pull
+            turned[e, k] = (turned[e, k] - along * unit[e, k]) * inverse[e]
+    for n in range(len(data.bending)):
+        u, v, sine, cosine = unit[n], unit[n + 1], data.turned[n, 0], data.turned[n, 1]
+        straight = data.bending[n] / (1.0 + (sine / _STRAIGHT) ** 2)
+        rate = along_u = along_v = 0.0
+        for k in range(3):
+            rate += (v[k] - cosine * u[k]) * turned[n, k] + (u[k] - cosine * v[k]) * turned[n + 1, k]
+            along_u += u[k] * (turned[n + 1, k] - turned[n, k])
+            along_v += v[k] * (turned[n + 1, k] - turned[n, k])
+        bent = (data.bending[n] - straight) * rate / (sine * sine)
+        for k in range(3):
+            change = turned[n + 1, k] - turned[n, k]
+            first = inverse[n] * (bent * (v[k] - cosine * u[k]) - straight * (change - u[k] * along_u))
+            second = inverse[n + 1] * (bent * (u[k] - cosine * v[k]) + straight * (change - v[k] * along_v))
+            out[n, k] -= first
+            out[n + 1, k] += first - second
+            out[n + 2, k] += second

@@ -1,19 +1,44 @@
 """Solids: stable Neo-Hookean cells, with assumed strains in boxes so that they bend as they should."""
 
+from functools import cache
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
 from ...core.material import SolidMaterial
-from .elasticity import Elasticity
-from .sparse import Operator, operator
+from .compiled import compiled
+from .elasticity import Elasticity, Kernels, kernels
 
 #: Of a box [-1, 1]^3, in the order of its corners: the four shapes that are not linear: yz, xz, xy and xyz.
 _CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 _X, _Y, _Z = _CORNERS.T
 _HOURGLASS = np.stack([_Y * _Z, _X * _Z, _X * _Y, _X * _Y * _Z]) / 8.0
+
+
+class VolumeData(NamedTuple):
+    """Of C cells of K corners with M motions besides the linear ones.
+
+    Args:
+        cells: ``(C, K)``.
+        gradients: from corners to F transposed and the other motions ``(C, 3 + M, K)``.
+        size: volumes ``(C,)`` [m3].
+        factor: on the stiffness ``(C,)``.
+        form: twice the energy of the other motions in the rest frame ``(C, 3 M, 3 M)`` [N/m].
+        mu, lame: Lame's constants [Pa].
+        shape: F transposed and the other motions of the remembered shape ``(C, 3 + M, 3)``.
+    """
+
+    cells: IntArray
+    gradients: FloatArray
+    size: FloatArray
+    factor: FloatArray
+    form: FloatArray
+    mu: float
+    lame: float
+    shape: FloatArray
 
 
 class Volume(Elasticity):
@@ -42,84 +67,148 @@ class Volume(Elasticity):
     """
 
     def __init__(self, body: Body, material: SolidMaterial) -> None:
+        self.kernels = _kernels()
         e, nu = material.youngs_modulus, material.poisson_ratio
-        self._mu = e / (2.0 * (1.0 + nu))
-        self._lame = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+        mu, lame = e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
         boxes = box_cells(body)
-        self._cells = body.elements if boxes is None else boxes
-        corners = body.vertices[self._cells]
+        cells = body.elements if boxes is None else boxes
+        corners, count = body.vertices[cells], len(cells)
         if boxes is None:
             edges = corners[:, 1:] - corners[:, :1]
             inverse = np.linalg.inv(edges)
             gradients = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-            self._size = body.measures
-            self._modes = 0
+            size, form = body.measures, np.zeros((count, 0, 0))
         else:
             axes = np.einsum("ka,ckx->cax", _CORNERS / 8.0, corners)  # half edges
             half = np.linalg.norm(axes, axis=2)
-            gradients = np.broadcast_to(_CORNERS.T / 8.0, (len(half), 3, 8)) / half[:, :, None]
-            self._size = 8.0 * half.prod(axis=1)
-            self._modes = 4
-            self._form = _hourglass_form(half, self._size, e, nu)
-            gradients = np.concatenate([gradients, np.broadcast_to(_HOURGLASS, (len(half), 4, 8))], axis=1)
-        count, size, each = len(self._cells), len(body.vertices), 3 + self._modes
-        rows = np.arange(count * each).reshape(count, each)[:, :, None]
-        columns = self._cells[:, None, :]
-        rows, columns = np.broadcast_arrays(rows, columns)
-        self._forward: Operator = operator(rows, columns, gradients, (count * each, size))
-        self._back: Operator = operator(columns, rows, gradients, (size, count * each))
-        self._weight, self._factor = self._size, np.ones(count)
+            gradients = np.broadcast_to(_CORNERS.T / 8.0, (count, 3, 8)) / half[:, :, None]
+            size = 8.0 * half.prod(axis=1)
+            form = _hourglass_form(half, size, e, nu)
+            gradients = np.concatenate([gradients, np.broadcast_to(_HOURGLASS, (count, 4, 8))], axis=1)
         self._share = None if boxes is None else _cell_of(body, boxes)
-        steep = (gradients[:, :3] ** 2).sum(axis=1) * (self._size * (self._lame + 2.0 * self._mu))[:, None]
-        if self._modes:
-            steep += np.einsum("cii->c", self._form)[:, None] / 64.0
-        self.diagonal = np.asarray(np.bincount(self._cells.ravel(), steep.ravel(), minlength=size), np.float64)
+        self.data = VolumeData(
+            np.array(cells, np.int64, order="C"),
+            np.array(gradients, order="C"),
+            np.array(size, np.float64),
+            np.ones(count),
+            np.array(form, order="C"),
+            float(mu),
+            float(lame),
+            np.zeros((count, gradients.shape[1], 3)),
+        )
+        steep = (gradients[:, :3] ** 2).sum(axis=1) * (size * (lame + 2.0 * mu))[:, None]
+        if boxes is not None:
+            steep += np.einsum("cii->c", form)[:, None] / 64.0
+        self.diagonal = np.asarray(np.bincount(cells.ravel(), steep.ravel(), len(body.vertices)), np.float64)
 
     def scale_stretch(self, factor: FloatArray | None) -> None:
+        own = self.data.factor
         if factor is None:
-            self._factor = np.ones(len(self._cells))
+            own[:] = 1.0
         elif self._share is None:
-            self._factor = factor
+            own[:] = factor
         else:
-            total = np.bincount(self._share, factor, minlength=len(self._cells))
-            self._factor = total / np.bincount(self._share, minlength=len(self._cells))
-        self._weight = self._size * self._factor
+            own[:] = np.bincount(self._share, factor, len(own)) / np.bincount(self._share, minlength=len(own))
 
-    def forces(self, positions: FloatArray) -> FloatArray:
-        shape = self._forward(positions).reshape(len(self._cells), -1, 3)
-        f = self._f = shape[:, :3]  # F transposed
-        cofactor = np.stack(
-            [np.cross(f[:, 1], f[:, 2]), np.cross(f[:, 2], f[:, 0]), np.cross(f[:, 0], f[:, 1])], axis=1
-        )
-        volume = np.einsum("ci,ci->c", f[:, 0], cofactor[:, 0])
-        swell = (self._lame + self._mu) * (volume - 1.0) - self._mu
-        load = np.empty_like(shape)
-        load[:, :3] = self._weight[:, None, None] * (self._mu * f + swell[:, None, None] * cofactor)
-        if self._modes:
-            self._q = shape[:, 3:]
-            self._hourglass(load, np.matmul(self._q, f.transpose(0, 2, 1)))
-        return -self._back(load.reshape(-1, 3))
 
-    def stiffness(self, motion: FloatArray) -> FloatArray:
-        rate = self._forward(motion).reshape(len(self._cells), -1, 3)
-        f, g = self._f, rate[:, :3]
-        product = np.matmul(f, g.transpose(0, 2, 1))
-        strain = product + product.transpose(0, 2, 1)  # twice the rate of Green's strain
-        trace = np.einsum("cii->c", strain)
-        stress = self._mu * strain + (0.5 * self._lame * trace)[:, None, None] * np.eye(3)
-        load = np.empty_like(rate)
-        load[:, :3] = self._weight[:, None, None] * np.matmul(stress, f)
-        if self._modes:
-            moved = np.matmul(rate[:, 3:], f.transpose(0, 2, 1)) + np.matmul(self._q, g.transpose(0, 2, 1))
-            self._hourglass(load, moved)
-        return self._back(load.reshape(-1, 3))
+@cache
+def _kernels() -> Kernels:
+    parts = {f.__name__: compiled(f, "solid") for f in (gather, scatter, hourglass)}
+    forces = compiled(volume_forces, "solid", **parts)
+    return kernels("solid", forces, compiled(volume_stiffness, "solid", **parts))
 
-    def _hourglass(self, load: FloatArray, amplitudes: FloatArray) -> None:
-        """Add the forces of ``amplitudes (C, 4, 3)``, the hourglass motions in the rest frame."""
-        flat = amplitudes.reshape(len(amplitudes), 12, 1)
-        answer = np.matmul(self._form, flat).reshape(-1, 4, 3) * self._factor[:, None, None]
-        load[:, 3:] = np.matmul(answer, self._f)
-        load[:, :3] += np.matmul(answer.transpose(0, 2, 1), self._q)
+
+def gather(data: VolumeData, cell: int, vectors: FloatArray, out: FloatArray) -> None:
+    """Set ``out (3 + M, 3)`` to F transposed and the other motions of a cell."""
+    gradients, corners = data.gradients[cell], data.cells[cell]
+    out[:] = 0.0
+    for row in range(gradients.shape[0]):
+        for c in range(len(corners)):
+            for k in range(3):
+                out[row, k] += gradients[row, c] * vectors[corners[c], k]
+
+
+def scatter(data: VolumeData, cell: int, sign: float, load: FloatArray, out: FloatArray) -> None:
+    """Add to ``out (V, 3)`` what ``load (3 + M, 3)``, as :func:`gather` sees it, does to a cell's corners."""
+    gradients, corners = data.gradients[cell], data.cells[cell]
+    for c in range(len(corners)):
+        for row in range(gradients.shape[0]):
+            for k in range(3):
+                out[corners[c], k] += sign * gradients[row, c] * load[row, k]
+
+
+def hourglass(data: VolumeData, cell: int, amplitudes: FloatArray, load: FloatArray) -> None:
+    """Add to ``load`` the forces of ``amplitudes (12,)``, the hourglass motions in the rest frame."""
+    form, shape = data.form[cell], data.shape[cell]
+    for mode in range(4):
+        for a in range(3):
+            answer = 0.0
+            for j in range(12):
+                answer += form[3 * mode + a, j] * amplitudes[j]
+            answer *= data.factor[cell]
+            for k in range(3):
+                load[3 + mode, k] += answer * shape[a, k]
+                load[a, k] += answer * shape[3 + mode, k]
+
+
+def volume_forces(data: VolumeData, positions: FloatArray, out: FloatArray) -> None:
+    """Elastic nodal forces ``out (V, 3)`` [N]."""
+    out[:] = 0.0
+    load, amplitudes = np.empty(data.shape.shape[1:]), np.empty(12)
+    for cell in range(len(data.cells)):
+        shape = data.shape[cell]
+        gather(data, cell, positions, shape)
+        load[:] = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            for k in range(3):
+                m, n = (k + 1) % 3, (k + 2) % 3
+                load[a, k] = shape[b, m] * shape[c, n] - shape[b, n] * shape[c, m]  # cofactor
+        volume = shape[0, 0] * load[0, 0] + shape[0, 1] * load[0, 1] + shape[0, 2] * load[0, 2]
+        swell, weight = (data.lame + data.mu) * (volume - 1.0) - data.mu, data.size[cell] * data.factor[cell]
+        for a in range(3):
+            for k in range(3):
+                load[a, k] = weight * (data.mu * shape[a, k] + swell * load[a, k])
+        if len(shape) > 3:
+            for mode in range(4):
+                for a in range(3):
+                    amplitudes[3 * mode + a] = 0.0
+                    for k in range(3):
+                        amplitudes[3 * mode + a] += shape[3 + mode, k] * shape[a, k]
+            hourglass(data, cell, amplitudes, load)
+        scatter(data, cell, -1.0, load, out)
+
+
+def volume_stiffness(data: VolumeData, motion: FloatArray, out: FloatArray) -> None:
+    """Stiffness times ``motion (V, 3)``."""
+    out[:] = 0.0
+    rate, load = np.empty(data.shape.shape[1:]), np.empty(data.shape.shape[1:])
+    amplitudes, strain = np.empty(12), np.empty((3, 3))  # strain: twice the rate of Green's
+    for cell in range(len(data.cells)):
+        shape = data.shape[cell]
+        gather(data, cell, motion, rate)
+        for a in range(3):
+            for b in range(3):
+                strain[a, b] = 0.0
+                for k in range(3):
+                    strain[a, b] += shape[a, k] * rate[b, k] + rate[a, k] * shape[b, k]
+        weight = data.size[cell] * data.factor[cell]
+        swell = 0.5 * data.lame * (strain[0, 0] + strain[1, 1] + strain[2, 2])
+        load[:] = 0.0
+        for a in range(3):
+            for k in range(3):
+                load[a, k] = swell * shape[a, k]
+                for b in range(3):
+                    load[a, k] += data.mu * strain[a, b] * shape[b, k]
+                load[a, k] *= weight
+        if len(shape) > 3:
+            for mode in range(4):
+                for a in range(3):
+                    amplitudes[3 * mode + a] = 0.0
+                    for k in range(3):
+                        amplitudes[3 * mode + a] += rate[3 + mode, k] * shape[a, k] + shape[3 + mode, k] * rate[a, k]
+            hourglass(data, cell, amplitudes, load)
+        scatter(data, cell, 1.0, load, out)
 
 
 def box_cells(body: Body) -> IntArray | None:

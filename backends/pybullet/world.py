@@ -1,35 +1,31 @@
-"""The world: substeps, held vertices, nodal forces, damping and Bullet's contact."""
+"""The world: substeps, held vertices, nodal forces, damping and contact."""
 
 import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.errors import RolloutFailed
-from ...core.obstacles import Table
 from ...core.scene import Scene
 from ...core.simulator import State, World
-from .client import Client
-from .colliders import NodeContact, add_tables
+from .contact import surfaces
 from .elasticity import Elasticity
+from .substep import Drive, Matter
+from .tables import Tables
 
 #: Substep times the fastest angular frequency at rest; the scheme is unstable from 2, strain may stiffen the body.
 _STEP_TIMES_FREQUENCY = 1.0
-#: A position [m] or velocity [m/s] beyond this is a blow-up.
-_FARTHEST = 1e4
-#: A vertex this near to a table, besides its own radius, is left to Bullet [m].
-_WATCH = 0.001
 
 
 class SoftWorld(World):
-    """One soft body in one Bullet world.
+    """One soft body in Bullet's worlds.
 
     The elastic forces are computed here; Bullet's own have no bending rigidity, or are mesh-dependent. So is
-    contact with curved obstacles. Before each of Bullet's steps the velocities are given what weight, nodal forces
-    and elasticity add in that time, ``v += f / m dt``, with the true masses. Bullet then integrates (symplectic
-    Euler, ``x += v dt``) and keeps the vertices out of tables, with Coulomb friction; tables do not move, so what
-    it does to a velocity is right whatever the mass. A substep in which nothing is in reach of a table is
-    ``x += v dt`` and no more, and is done here: the same numbers, without the way to Bullet and back.
+    contact with curved obstacles. In every substep the velocities are given what weight, nodal forces
+    and elasticity add in that time, ``v += f / m dt``, with the true masses, and then ``x += v dt`` (symplectic
+    Euler). That is done in machine code, :mod:`~muslin.backends.pybullet.substep`, and is what Bullet does with nodes
+    that touch nothing. Vertices that would end a substep inside a table are moved by Bullet, which keeps them out, with
+    Coulomb friction.
 
-    Held vertices are infinitely heavy in Bullet and move on straight lines at the velocity that brings them to
+    Held vertices touch nothing, and move on straight lines at the velocity that brings them to
     their place at the end of the step.
 
     Damping C = beta K is implicit, in every substep: done every few substeps it resonates with the fastest
@@ -52,38 +48,24 @@ class SoftWorld(World):
         self.masses = body.vertex_measures * scene.material.density + scene.loads
         if not self.masses.min() > 0:
             raise RolloutFailed(f"vertex {int(self.masses.argmin())} has no mass")
-        self._held, self._free = scene.held, np.ones(count, dtype=np.bool_)
-        self._free[scene.held] = False
+        free = np.ones(count, dtype=np.bool_)
+        free[scene.held] = False
+        self._matter = Matter(self.masses, free, scene.held.copy())
         self._elasticity = elasticity
         self._weight = self.masses[:, None] * scene.gravity
-        self._inverse = 1.0 / self.masses[:, None]
         self._beta = scene.material.damping_time
         self._most_substeps = most_substeps
-        self._needed = time_step * elasticity.fastest(body.vertices, self.masses, self._free) / _STEP_TIMES_FREQUENCY
+        self._needed = time_step * elasticity.fastest(body.vertices, self.masses, free) / _STEP_TIMES_FREQUENCY
         self._substeps = self._substeps_with(None)
 
         self._positions = scene.start_positions.astype(np.float64)
         self._velocities = np.zeros((count, 3))
         self._contact = np.zeros((count, 3))
-        self._buffer = np.empty((count, 4))
-        self._client: Client | None = None
+        self._past = np.zeros((2, count, 3))
         friction, radius = scene.material.friction, scene.contact_radius
-        tables = [o.height + radius for o in scene.obstacles if isinstance(o, Table)]
-        self._reach = max(tables, default=-np.inf) + _WATCH
-        self._touch = [
-            NodeContact(o, friction, radius, self._free) for o in scene.obstacles if not isinstance(o, Table)
-        ]
+        self._surfaces = surfaces(scene.obstacles, friction, radius, count)
+        self._tables = Tables(scene.obstacles, friction, radius, count)
         self._touching = bool(scene.obstacles)
-        self._current = False
-        if tables:
-            self._client = Client()
-            try:
-                add_tables(self._client, scene.obstacles, friction)
-                self._client.load(count, float(self.masses.sum()), radius)
-                self._client.fix(scene.held)
-            except BaseException:
-                self._client.close()
-                raise
 
     def _substeps_with(self, stiffness: FloatArray | None) -> int:
         """How many substeps a step needs with ``stiffness (E,)`` times the stretch stiffness."""
@@ -102,64 +84,31 @@ class SoftWorld(World):
         substeps = self._substeps if stiffness is None else self._substeps_with(stiffness)
         dt = self.time_step / substeps
         self._elasticity.scale_stretch(stiffness)
+        matter, tau = self._matter, self._beta * dt
         push = self._weight if forces is None else self._weight + forces
-        pull = (held - self._positions[self._held]) / self.time_step
-        pace = dt * self._inverse
-        x, v = self._positions, self._velocities
-        pushed = np.zeros_like(x)
-        if self._client is not None:
-            self._client.set_time_step(dt)
-        for _ in range(substeps):
-            force = self._elasticity.forces(x)
-            force += push
-            force *= pace
-            v = np.add(v, force, out=force)
-            v[self._held] = pull
-            if self._beta > 0:
-                v = self._elasticity.damped(v, self.masses, self._free, self._beta * dt)
-            shift: FloatArray | None = None
-            if self._touch:
-                before = v.copy()
-                for touch in self._touch:
-                    more = touch(x, v, dt)
-                    shift = more if shift is None else shift if more is None else shift + more
-                pushed += v - before
-            moved = x + dt * v
-            if self._client is not None and moved[:, 2].min() < self._reach:
-                moved, after = self._bullet(x, v)
-                pushed += after - v
-                v = after
-            else:
-                self._current = False
-            if shift is not None:
-                moved += shift
-                self._current = False
-            x = moved
+        pull = (held - self._positions[matter.held]) / self.time_step
+        precondition = matter.free / (self.masses + tau * self._elasticity.diagonal)
+        drive = Drive(
+            dt, substeps, np.ascontiguousarray(push), np.ascontiguousarray(pull), tau, precondition, self._tables.reach
+        )
+        x, v = self._positions.copy(), self._velocities.copy()
+        shift, pushed = np.zeros_like(x), np.zeros_like(x)
+        near = np.empty(len(x), np.int64)
+        fixed = (self._elasticity.data, matter, self._surfaces, drive, x, v, shift, pushed, self._past, near)
+        done = 0
+        while done < substeps:
+            done, touching = self._elasticity.kernels.advance(*fixed, done)
+            if touching:
+                which = near[:touching]
+                place, velocity = self._tables.step(x[which], v[which], dt)
+                pushed[which] += velocity - v[which]
+                x[which], v[which] = place + shift[which], velocity
         if not np.isfinite(x.sum() + v.sum()):
             raise RolloutFailed("positions are not finite")
-        if len(self._held):
-            x[self._held], v[self._held] = held, pull  # takes away the rounding of the substeps
-            self._current = False
+        if len(matter.held):
+            x[matter.held], v[matter.held] = held, pull  # takes away the rounding of the substeps
         self._positions, self._velocities = x, v
         self._contact = self.masses[:, None] / self.time_step * pushed
 
-    def _bullet(self, positions: FloatArray, velocities: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Positions and velocities after a step of Bullet; besides contact it takes penetration back bit by bit."""
-        client = self._client
-        assert client is not None
-        # Bullet must not see what is not finite or overflows: its trees of boxes would not survive it.
-        if not max(np.abs(positions).max(), np.abs(velocities).max()) < _FARTHEST:
-            raise RolloutFailed("a vertex is not finite, or farther away or faster than anything real")
-        if not self._current:
-            client.set_positions(positions)
-            self._current = True
-        client.set_velocities(velocities)
-        client.step()
-        client.read_positions(self._buffer)
-        moved = self._buffer[:, :3].copy()
-        client.read_velocities(self._buffer)
-        return moved, self._buffer[:, :3].copy()
-
     def close(self) -> None:
-        if self._client is not None:
-            self._client.close()
+        self._tables.close()

@@ -92,7 +92,8 @@ def test_one_version_is_compiled_for_whatever_arrays_come(body, material):
         with opened(scene(one, material, held=np.array([0]), obstacles=(Table(-1.0),))) as world:
             world.step(np.asfortranarray(frozen[:1]), np.asfortranarray(np.zeros_like(frozen)))
             kernels = world._elasticity.kernels
-    assert [len(kernel.signatures) for kernel in kernels] == [1] * len(kernels)
+    assert len(kernels.advance.signatures) == 1
+    assert max(len(kernel.signatures) for kernel in kernels) == 1
 
 
 def test_opening_often_leaks_nothing():
