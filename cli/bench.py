@@ -1,6 +1,5 @@
 """``muslin bench-material``: whether a simulator's object is what its material says."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -9,7 +8,7 @@ import typer
 from ..core.bench import TESTS, lines, run_bench
 from ..core.registry import REGISTRY
 from .console import ProgressView, say
-from .output import check_output
+from .output import check_output, write_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -40,5 +39,5 @@ def bench_material(
     for line in lines(report):
         say(line)
     if json_file is not None:
-        json_file.write_text(json.dumps(report.to_json(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+        write_json(json_file, report.to_json())
         say(f"wrote {json_file}")

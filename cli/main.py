@@ -74,8 +74,6 @@ def run(arguments: Sequence[str] | None = None) -> NoReturn:
             traceback.print_exc()
         print(f"muslin: error: {message}", file=sys.stderr)
     if status == INTERRUPTED:
-        print(
-            "muslin: interrupted; a fit that is run again goes on from what it has simulated",
-            file=sys.stderr,
-        )
+        goes_on = "; run again, it goes on from what it has simulated" if "fit" in given[:1] else ""
+        print(f"muslin: interrupted{goes_on}", file=sys.stderr)
     sys.exit(status if isinstance(status, int) else 0)

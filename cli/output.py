@@ -1,9 +1,13 @@
 """Files that commands write: checked before the work starts."""
 
+import json
+import math
 import os
 from pathlib import Path
+from typing import Any
 
 from ..core.errors import InputError, MissingFileError
+from ..core.store import write_text
 
 
 def check_output(path: Path, force: bool) -> None:
@@ -17,3 +21,16 @@ def check_output(path: Path, force: bool) -> None:
         raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
     if not os.access(parent, os.W_OK):
         raise InputError(f"no permission to write in {parent}")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write ``value`` as JSON, which has no NaN and no infinity: they become null."""
+    write_text(path, json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

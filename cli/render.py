@@ -145,7 +145,12 @@ def _estimate(study: Study, problem: Problem) -> dict[str, float]:
 
 
 def _resampled(times: FloatArray, fps: float | None) -> FloatArray:
-    return times if fps is None else np.arange(times[0], times[-1] + 1e-9, 1.0 / fps)
+    if fps is None:
+        return times
+    made = np.arange(times[0], times[-1] + 1e-9, 1.0 / fps)
+    if len(made) < 2:
+        raise InputError(f"--fps {fps:g} gives one frame of a motion of {times[-1] - times[0]:.3g} s; raise it")
+    return made
 
 
 def _write(folder: Path, number: int, frame: Frame) -> None:

@@ -1,6 +1,5 @@
 """``muslin compare-simulators``: the same draws on several simulators."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +10,8 @@ from ..core.errors import InputError, MuslinError
 from ..core.material import UNITS
 from ..core.parameters import Parameter
 from ..core.scenarios import preset
-from ..core.store import write_text
 from .console import ProgressView, say
-from .output import check_output
+from .output import check_output, write_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -41,6 +39,12 @@ def compare_simulators(
     workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; default one a core.")] = None,
 ) -> None:
     """Run the same draws on several simulators and report how far apart they are, where, and when."""
+    try:
+        from .report.simulators import write_simulator_report
+    except ImportError as error:
+        if (error.name or "").split(".")[0] not in ("matplotlib", "jinja2"):
+            raise
+        raise MuslinError(f"a report needs {error.name}; install it with: pip install 'muslin[report]'") from error
     target = output or Path(f"{scenario}.simulators.html")
     base = preset(scenario)
     for file in (target, json_file):
@@ -51,14 +55,8 @@ def compare_simulators(
     with ProgressView() as progress:
         found = run_comparison(scenario, names, draws, parameters=space, seed=seed, workers=workers, progress=progress)
     say(found.text())
-    try:
-        from .report.simulators import write_simulator_report
-    except ImportError as error:
-        if (error.name or "").split(".")[0] not in ("matplotlib", "jinja2"):
-            raise
-        raise MuslinError(f"a report needs {error.name}; install it with: pip install 'muslin[report]'") from error
     if json_file is not None:
-        write_text(json_file, json.dumps(found.to_json(), indent=2) + "\n")
+        write_json(json_file, found.to_json())
         say(f"wrote {json_file}")
     say(f"wrote {write_simulator_report(found, base.body().edges, target)}")
 

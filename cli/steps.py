@@ -1,17 +1,14 @@
 """``muslin fit``, ``compare``, ``diagnose``, ``add`` and ``report``: the steps of a study."""
 
-import json
-import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from ..core.errors import InputError
-from ..core.store import write_text
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
-from .output import check_output
+from .output import check_output, write_json
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
 Workers = Annotated[
@@ -69,7 +66,7 @@ def diagnose(
     say(result.text())
     verdict = result.to_json()
     if json_file is not None:
-        write_text(json_file, json.dumps(_plain(verdict), indent=2, allow_nan=False) + "\n")
+        write_json(json_file, verdict)
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:
@@ -127,12 +124,3 @@ def report(
     made = write_report(Study.load(study), output, Study.load(after) if after is not None else None)
     say(f"wrote {made}")
     say("open it in a browser; it needs no other file")
-
-
-def _plain(value: Any) -> Any:
-    """JSON has no NaN and no infinity: they become null."""
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -80,6 +80,7 @@ measurement = {_value(plan.measurement)}  # relative to this file
 fit_on = {_value(plan.fit_on)}  # recordings that the fit sees
 hold_out = {_value(plan.hold_out)}  # recordings kept back, to check every claim on
 seed = 0  # same seed, same machine: same result
+# time_limit = 120.0  # a simulation that takes longer has failed [s]
 """
 
 

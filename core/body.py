@@ -101,6 +101,7 @@ class Body:
         return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
 
     def scaled(self, factor: float, about: FloatArray) -> "Body":
+        """``factor`` times as large, the point ``about (3,)`` [m] staying where it is."""
         return replace(self, vertices=about + (self.vertices - about) * factor)
 
 

@@ -58,6 +58,7 @@ class Effect(ABC):
 
     @property
     def is_off(self) -> bool:
+        """Whether every coefficient is zero."""
         return all(v == 0.0 for v in self.values.values())
 
     @classmethod
@@ -68,6 +69,7 @@ class Effect(ABC):
         )
 
     def on_material(self, material: Material) -> Material:
+        """The material [SI] as this effect changes it, of the same class."""
         return material
 
     def on_gravity(self, gravity: FloatArray) -> FloatArray:

@@ -12,7 +12,8 @@ def why_powerless(effect: type[Effect], simulator: Simulator, scenario: Scenario
         return f"effect {name!r} is for {' and '.join(sorted(effect.object_kinds))}, not for a {scenario.body.kind}"
     missing = sorted(effect.needs - simulator.capabilities)
     if missing:
-        return f"effect {name!r} needs a simulator that can {CAPABILITIES[missing[0]]}, but {simulator.name!r} cannot"
+        what = CAPABILITIES.get(missing[0], repr(missing[0]))
+        return f"effect {name!r} needs a simulator that can {what}, but {simulator.name!r} cannot"
     if effect.acts_on == "contact" and not scenario.obstacles:
         return f"effect {name!r} acts where the object touches something, but there is no obstacle"
     if effect.acts_on in ("grasp", "command") and not scenario.grasps:

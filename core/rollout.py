@@ -30,8 +30,8 @@ class Trajectory:
 
     Args:
         series: the observed markers.
-        vertices: ``(T, V, 3)`` [m] at the observation times.
-        poses: gripper poses really made ``(T, G, 7)``.
+        vertices: ``(T, V, 3)`` [m] when they were seen, before what effects make of points.
+        poses: gripper poses really made ``(T, G, 7)`` at the observation times.
         seconds: that the computation took [s].
     """
 
@@ -88,7 +88,7 @@ def rollout(
         factors = [f for f in (e.bind_stiffness(scene) for e in active) if f is not None]
         shifts = [f for f in (e.bind_grasp(scene, world.masses) for e in active) if f is not None]
         settle_steps = int(np.ceil(scenario.settle / dt - 1e-9))
-        start, end = scenario.times[0], max(scenario.times[-1], seen[-1])
+        start, end = scenario.times[0], max(scenario.times[-1], seen.max())
         steps = int(np.ceil((end - start) / dt - 1e-9))
         clock = start + dt * np.arange(-settle_steps, steps + 1)
         held = scenario.held_positions(np.maximum(clock, start), scene.start_positions)
@@ -102,7 +102,8 @@ def rollout(
             if k % _CHECK_EVERY == 0 or k == len(clock) - 1:
                 sane(state.positions, now)
             if time.monotonic() > deadline:  # a step may take seconds
-                raise RolloutFailed(f"took longer than {time_limit:g} s, and had come to {now:.3f} s")
+                where = f"had come to {now:.3f} s" if now >= start else "was still settling before the first frame"
+                raise RolloutFailed(f"took longer than {time_limit:g} s, and {where}")
             if k == len(clock) - 1:
                 break
             total: FloatArray | None = None
@@ -135,6 +136,5 @@ def rollout(
 
 def _check_needs(effect: Effect, simulator: Simulator) -> None:
     for need in sorted(effect.needs - simulator.capabilities):
-        raise InputError(
-            f"effect {effect.name!r} needs a simulator that can {CAPABILITIES[need]}, but {simulator.name!r} cannot"
-        )
+        what = CAPABILITIES.get(need, repr(need))
+        raise InputError(f"effect {effect.name!r} needs a simulator that can {what}, but {simulator.name!r} cannot")

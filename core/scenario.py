@@ -103,6 +103,7 @@ class Scenario:
         return self.start(body, self.motion.at(self.times[:1])[0], self.obstacles, clearance)
 
     def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
+        """What an engine builds: ``material`` in SI, ``gravity (3,)`` [m/s2], ``scale`` of the object's size [1]."""
         body = replace(self.body, vertices=self.world_vertices(scale))
         loads = np.zeros(len(body.vertices))
         if self.load > 0:

@@ -61,7 +61,8 @@ class World(ABC):
     masses: FloatArray
 
     @abstractmethod
-    def state(self) -> State: ...
+    def state(self) -> State:
+        """Where the vertices are, at the end of the last step or at the start."""
 
     @abstractmethod
     def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
@@ -102,6 +103,13 @@ class Simulator(ABC):
         Raises:
             RolloutFailed: the engine cannot build this scene with these numbers.
         """
+
+    def prepare(self, scene: Scene) -> None:
+        """Do what takes long once in a process, as compiling, before worlds of scenes like this one are opened.
+
+        That is not counted in the time of a rollout. Whatever it raises is not told: :meth:`open` will say it again.
+        """
+        return None
 
     @abstractmethod
     def engine_version(self) -> str:

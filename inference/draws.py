@@ -87,6 +87,14 @@ class DrawStore:
         """Reasons of the draws that failed."""
         return list(self._failures().values())
 
+    def forget_failures(self) -> None:
+        """Make failed draws absent again, so that they are tried anew when the fit goes on."""
+        failed = self.status == FAILED
+        self.status = np.where(failed, np.int8(ABSENT), self.status)
+        with storage_errors(self._path):
+            self._draws["status"][...] = self.status
+            self.group.attrs["failures"] = {}
+
     def tried(self) -> tuple[FloatArray, BoolArray]:
         """Unit parameters ``(N, D)`` of all draws that were simulated, and which of them failed ``(N,)``."""
         there = self.status != ABSENT

@@ -123,11 +123,11 @@ def _fit(study: Study, noise: Noise) -> FitResult:
             for done, i in enumerate(missing):
                 store.write(first + i, proposal[i], {r: next(outcomes) for r in problem.fit_on})
                 if not (store.status == WHOLE).any() and (store.status == FAILED).sum() >= HOPELESS:
-                    raise MuslinError(_too_many_failed(store, problem.space))
+                    raise _too_many_failed(store, problem.space)
                 study.progress(f"round {k + 1} of {rounds}: simulating", per_round - len(missing) + done + 1, per_round)
             theta, points, numbers = store.read(first + per_round)
             if len(theta) < max(10, 0.1 * (first + per_round)):
-                raise MuslinError(_too_many_failed(store, problem.space))
+                raise _too_many_failed(store, problem.space)
             study.progress(f"round {k + 1} of {rounds}: training {config.estimator.name}", 0, 0)
             density.append(_train(study, observer, theta, points, numbers, density, k))
         study.progress("polishing the best draw by least squares", 0, 0)
@@ -246,13 +246,17 @@ def _best_draw(study: Study, store: DrawStore, noise: Noise) -> FloatArray:
     return np.asarray(theta[int(np.argmin(total))])
 
 
-def _too_many_failed(store: DrawStore, space: ParameterSpace) -> str:
+def _too_many_failed(store: DrawStore, space: ParameterSpace) -> MuslinError:
     theta, failed = store.tried()
-    where = region_text(space, theta, failed)
-    return (
-        f"{int(failed.sum())} of {len(failed)} draws could not be simulated: {reasons_text(store.failures())}"
+    where, reasons = region_text(space, theta, failed), store.failures()
+    store.forget_failures()  # what made them fail may be mended where the fingerprint of the study does not see it
+    advice = "Narrow the priors in [parameters], lower [simulator] time_step or raise [study] time_limit"
+    if any("in a plugin" in r for r in reasons):
+        advice = "An effect, extractor or simulator of the study is at fault: mend it (muslin check NAME)"
+    return MuslinError(
+        f"{int(failed.sum())} of {len(failed)} draws could not be simulated: {reasons_text(reasons)}"
         + (f"; {where}" if where else "")
-        + ". Narrow the priors in [parameters], lower [simulator] time_step or raise [study] time_limit, then fit again"
+        + f". {advice}, then fit again"
     )
 
 

@@ -22,8 +22,27 @@ def test_the_table_of_hidden_effects_is_what_the_benchmark_wrote() -> None:
         assert f"{rows[f'hidden {hidden}: held-out error after']:.1f}" == after
 
 
-@pytest.mark.parametrize("command", sorted(set(re.findall(r"muslin (import|[a-z]+) ", README)) & {
-    "import", "new", "fit", "compare", "diagnose", "add", "report", "plugins", "check"}))  # fmt: skip
+def test_the_table_of_materials_is_what_the_bench_wrote() -> None:
+    """Recounted here: the worst error on the finest mesh and the goals met, for every group and simulator."""
+    lines = re.findall(r"^\| ([a-z]+) \| (.*(?:met|claimed)) \| (.*(?:met|claimed)) \|$", README, re.MULTILINE)
+    assert len(lines) >= 7
+    for column, name in enumerate(("mujoco", "pybullet"), start=1):
+        rows = json.loads((ROOT / f"results/material-{name}.json").read_text())["rows"]
+        for line in lines:
+            judged = [r for r in rows if r["group"] == line[0] and r["goal"] is not None and r["claimed"]]
+            if not judged:
+                assert line[column] == "not claimed"
+                continue
+            met = sum(r["status"] == "met" for r in judged)
+            assert line[column].endswith(f"{met} of {len(judged)} met")
+            errors = [abs(r["error"]) for r in judged if r["error"] is not None and r["asked"]]
+            if errors:
+                assert line[column].startswith(f"{100 * max(errors):.1f} %")
+
+
+@pytest.mark.parametrize("command", sorted(set(re.findall(r"muslin ([a-z]+(?:-[a-z]+)?) ", README)) & {
+    "import", "new", "fit", "compare", "diagnose", "add", "report", "plugins", "check",
+    "bench-material", "compare-simulators", "render"}))  # fmt: skip
 def test_the_commands_of_the_readme_exist(command: str) -> None:
     done = subprocess.run([sys.executable, "-m", "muslin.cli", command, "--help"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -65,6 +65,7 @@ class MujocoWorld(World):
         self._before = np.empty_like(self._qpos), np.empty_like(self._qvel)
         self._damping_time = scene.material.damping_time
         self._touching = False
+        self._elapsed = 0.0  # MuJoCo's own clock runs at the pace of its own steps
         self._bending = SoftBending(made.soft_bending, self._damping_time) if made.soft_bending.size else None
         bent = scene.body.kind == "rope" and "curved-rest" in needed_capabilities(scene)
         self._overshoot = 0.0 if bent else OVERSHOOT[scene.body.kind]
@@ -87,9 +88,10 @@ class MujocoWorld(World):
         return vectors if self._turn is None else np.asarray(vectors @ self._turn)
 
     def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
+        self._elapsed += self.time_step
         if forces is not None:
             if not np.isfinite(forces.sum()):  # MuJoCo would leave out the steps and say nothing
-                raise RolloutFailed(f"a nodal force is not finite at {self._data.time:.3f} s")
+                raise RolloutFailed(f"a nodal force is not finite {self._elapsed:.3f} s after the start")
             forces = self._inward(forces).ravel()
         if stiffness is not None or self._stretched:
             self._set_stiffness(stiffness)
@@ -109,7 +111,9 @@ class MujocoWorld(World):
         qpos[commanded] = self._target
         qvel[commanded] = velocity
         if np.count_nonzero(self._warnings):
-            raise RolloutFailed(f"MuJoCo warned at {self._data.time:.3f} s: {' '.join(WARNINGS) or 'no text'}")
+            raise RolloutFailed(
+                f"MuJoCo warned {self._elapsed:.3f} s after the start: {' '.join(WARNINGS) or 'no text'}"
+            )
 
     def _load(self, forces: FloatArray | None, ahead: float) -> None:
         """Hand over nodal forces ``(3 V,)`` [N] and the bending of a state ``ahead`` [s]."""
@@ -167,7 +171,7 @@ class MujocoWorld(World):
             self._stretch[:] = self._plain
             return
         if not np.isfinite(factor).all():
-            raise RolloutFailed(f"a factor on the stiffness is not finite at {self._data.time:.3f} s")
+            raise RolloutFailed(f"a factor on the stiffness is not finite {self._elapsed:.3f} s after the start")
         mean = np.bincount(self._cells, factor, minlength=len(self._parts)) / self._parts
         np.multiply(self._plain, np.maximum(mean, _SMALLEST_FACTOR)[:, None], out=self._stretch)
 

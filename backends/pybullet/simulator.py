@@ -72,5 +72,13 @@ class PybulletSimulator(Simulator):
             return SoftWorld(scene, self.time_step, self.most_substeps, Rod(body, material, scene.held))
         return SoftWorld(scene, self.time_step, self.most_substeps, Volume(body, material))
 
+    def prepare(self, scene: Scene) -> None:
+        """One step compiles everything for this kind of body, or loads it where it has been compiled before."""
+        world = self.open(scene)
+        try:
+            world.step(scene.start_positions[scene.held], None)
+        finally:
+            world.close()
+
     def engine_version(self) -> str:
         return library.version()

@@ -58,7 +58,7 @@ def _pair(
             ("the draw they disagree on most", ranked[-1]),
         ):
             shots.append(
-                {"title": title, "values": _values(found, draw), **_shot(found, one, other, draw, apart, edges)}
+                {"title": title, "drawn": _values(found, draw), **_shot(found, one, other, draw, apart, edges)}
             )
     return {
         "names": (one.name, other.name),

@@ -10,7 +10,7 @@ from ..material import DEFAULT_PRIORS, MATERIALS, Material
 from ..parameters import Parameter, ParameterSpace
 from ..registry import REGISTRY
 from ..rollout import Trajectory
-from ..scenario import Scenario
+from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
 from ..simulator import Simulator
 from ..study import Problem, SimulationPool, Task
@@ -58,7 +58,7 @@ def compare_simulators(
     material = material or MATERIALS[scenario.body.kind]()
     space = ParameterSpace(tuple(DEFAULT_PRIORS[scenario.body.kind] if parameters is None else parameters))
     for simulator in made:
-        simulator.check(scenario.scene(material, np.array([0.0, 0.0, -9.8])))
+        simulator.check(scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY])))
     unit = latin_hypercube(draws, len(space), seed)
     values = space.from_unit(unit)
     tasks = [Task(dict(zip(space.names, row.tolist(), strict=True)), scenario.name) for row in values]

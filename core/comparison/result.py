@@ -163,6 +163,8 @@ class SimulatorComparison:
                     f"  {name:20s} low {low:.1f}, middle {middle:.1f}, high {high:.1f} mm apart; "
                     f"what it does has cosine {cosines[p]:.2f}"
                 )
+        if not all(np.isfinite(m).all() for m in moves):
+            lines += ["", f"nan: too few draws ended well to tell; {4 * (len(self.space) + 1)} or more would do"]
         return "\n".join(lines)
 
 

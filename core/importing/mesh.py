@@ -64,10 +64,12 @@ def read_body(path: Path, scale: float = 1.0, up: str = "z", count: int | None =
         )
     size = float(np.ptp(body.vertices, axis=0).max())
     if not SMALLEST <= size <= LARGEST:
-        raise InputError(
-            f"{path}: the object is {size:.4g} m large with mesh_scale = {scale:g}; is the file in millimetres "
-            "(mesh_scale = 0.001) or centimetres (0.01)?"
+        hint = (
+            "is the file in millimetres (mesh_scale = 0.001) or centimetres (0.01)?"
+            if size > LARGEST or scale >= 1.0
+            else "is the file in metres already (mesh_scale = 1)?"
         )
+        raise InputError(f"{path}: the object is {size:.4g} m large with mesh_scale = {scale:g}; {hint}")
     return body
 
 
@@ -158,6 +160,8 @@ def _read(path: Path, reader: Callable[[], Any]) -> Any:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return reader()
+    except ImportError as error:  # a reader guesses at the encoding of what is no text, with what is not installed
+        raise InputError(f"{path} is damaged or not a {path.suffix.lower()} file") from error
     except Exception as error:
         reason = (str(error).strip() or type(error).__name__).splitlines()[0]
         raise InputError(f"{path} is damaged or not a {path.suffix.lower()} file: {reason:.200}") from error

@@ -86,7 +86,7 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
 
 
 def _check_columns(path: Path, columns: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> None:
-    layout = f"columns are {', '.join(required)} and optionally {', '.join(optional)}"
+    layout = f"columns are {', '.join(required)}" + (f" and optionally {', '.join(optional)}" if optional else "")
     if not any(columns):
         raise InputError(f"{path} is empty; its first line must name the columns: {layout}")
     twice = sorted({c for c in columns if columns.count(c) > 1})

@@ -17,20 +17,31 @@ class GivenShape:
 
     Args:
         vertices: ``(V, 3)`` [m] in the frame of the first gripper at its first pose.
-        measure: length of the object at rest [m]; if it is scaled, so is the shape about its first vertex.
+        measure: length of the object at rest [m]; if it is scaled, so is the shape.
+        about: the point of the same frame that scaling leaves where it is ``(3,)`` [m].
     """
 
     vertices: FloatArray
     measure: float
+    about: FloatArray
 
     def __call__(self, body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clearance: float) -> FloatArray:
         scale = float(body.measures.sum()) / self.measure
-        local = self.vertices[0] + scale * (self.vertices - self.vertices[0])
+        local = self.about + scale * (self.vertices - self.about)
         return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 
 def sagging(body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clearance: float) -> FloatArray:
-    """A rope that hangs from the first gripper to the second, at rest under its weight but for bending."""
+    """A rope that hangs from the first gripper to the second, at rest under its weight but for bending.
+
+    Raises:
+        InputError: there is no second gripper.
+    """
+    if len(poses) < 2:
+        raise InputError(
+            "[scenario]: a rope that hangs between two grippers needs poses of both, but the recording has those of "
+            f"{len(poses)}; a rope with one end free is scenario 'swing' or 'hang', or another that takes a rope"
+        )
     count = len(body.vertices)
     return hanging_chain(poses[0, :3], poses[1, :3], count, float(body.measures.sum()) / (count - 1))
 

@@ -85,6 +85,7 @@ class MeshTable(_Table):
         return StaticMesh(vertices + np.array(self.position), triangles, self.friction)
 
 
+_OBSTACLES = ("table", "cylinder", "mesh")
 ObstacleTable = Annotated[TableTable | CylinderTable | MeshTable, Field(discriminator="kind")]
 
 
@@ -218,8 +219,16 @@ def parse_config(table: dict[str, Any], where: str) -> StudyConfig:
                 lines.append(
                     f"[{place}] is not a key here.{nearest(str(e['loc'][-1]), known)} Keys: {', '.join(known)}"
                 )
+            elif e["type"] == "missing" and isinstance(e["loc"][-1], int):
+                lines.append(f"[{place.rpartition('.')[0]}] has too few numbers; got {e['input']!r:.80}")
             elif e["type"] == "missing":
                 lines.append(f"[{place}] is missing")
+            elif e["type"].startswith("union_tag"):
+                tag, kinds = str(e.get("ctx", {}).get("tag", "")), list(_OBSTACLES)
+                what = f"there is no obstacle of kind {tag!r}.{nearest(tag, kinds)}" if tag else "kind is missing."
+                lines.append(f"[{place}] {what} Kinds: {', '.join(kinds)}")
+            elif e["type"] in ("list_type", "tuple_type"):
+                lines.append(f"[{place}] must be a list, [ ... ]; got {e['input']!r:.80}")
             else:
                 got = "" if isinstance(e["input"], dict) else f"; got {e['input']!r:.80}"
                 lines.append(f"[{place}] {e['msg'].removeprefix('Value error, ')}{got}")

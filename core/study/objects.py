@@ -56,13 +56,15 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path) -> 
     motion = recording.gripper or base.motion(None if table.mesh else given)
     body = _in_gripper_frame(given, table.frame, motion, float(recording.series.time[0]))
     start: StartShape | None = base.start if table.mesh is None else None
+    grasps = grasps_of(table, given)
     if table.straight_rest:
-        start = GivenShape(body.vertices, float(body.measures.sum()))
+        held = body.vertices[grasps[0]] if grasps else body.vertices
+        start = GivenShape(body.vertices, float(body.measures.sum()), held.mean(axis=0))
         body = _straightened(body)
     plain = Scenario(
         name=table.name,
         body=body,
-        grasps=grasps_of(table, given),
+        grasps=grasps,
         motion=motion,
         times=recording.series.time,
         markers=np.eye(len(body.vertices)),

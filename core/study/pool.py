@@ -51,6 +51,7 @@ class SimulationPool:
         self._busy: set[Worker] = set()
         self._file: str | None = None
         self._accepted = False  # the study has been simulated, well or not, at least once
+        self._prepared = False  # in this process
         self._closed = False
 
     def __enter__(self) -> "SimulationPool":
@@ -105,6 +106,10 @@ class SimulationPool:
                 warnings.warn(f"{_HERE} ({error})", stacklevel=4)
                 self.workers = 0
         if self._threads is None:
+            if tasks and not self._prepared:
+                with threadpool_limits(1):
+                    self.problem.prepare()
+                self._prepared = True
             for task in tasks:
                 with threadpool_limits(1):  # not across the yield: what the caller does is not ours to limit
                     outcome = simulate(self.problem, task)

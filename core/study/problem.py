@@ -2,6 +2,7 @@
 
 import inspect
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from ..extractor import KeypointExtractor
 from ..material import UNITS, Material, with_fields
 from ..measurement import Measurement, Recording
 from ..parameters import Parameter, ParameterSpace
+from ..powerless import why_powerless
 from ..registry import REGISTRY, nearest
 from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
@@ -75,6 +77,12 @@ class Problem:
         seen = self.extractor.extract(trajectory.series, trajectory.series.time)
         return replace(trajectory, series=seen)
 
+    def prepare(self) -> None:
+        """Let the simulator get ready in this process, so that no rollout pays for it in time; nothing is raised."""
+        with suppress(Exception):
+            gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+            self.simulator.prepare(self.scenarios[self.fit_on[0]].scene(self.material, gravity))
+
     def with_effects(self, *names: str) -> "Problem":
         """The same problem with the coefficients of these effects added to the parameters."""
         extra = tuple(p for n in names for p in self.effects[n].parameters())
@@ -108,6 +116,9 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     coefficients, fixed = _effect_values(config, effects)
     space = ParameterSpace((_parameters(config, material) or base.default_priors(kind)) + coefficients)
     simulator = _plugin("simulator", config.simulator.name, config.simulator.options)
+    for n, effect in effects.items():
+        if (reason := why_powerless(effect, simulator, scenarios[fit_on[0]])) is not None:
+            raise InputError(f"[effects.{n}]: {reason}")
     extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
     if extractor.needs_images:
         raise InputError(f"extractor {config.extractor.name!r} needs images, but the measurement holds points")

@@ -164,6 +164,7 @@ class Study:
             config.study.measurement = str(self.measurement_path.resolve())
             config.scenario.move_files(lambda name: str((self.path.parent / name).resolve()))
         study = Study(config, path, workers=self.workers, progress=self.progress)
+        study.problem  # noqa: B018  an effect that cannot act here is refused before anything is written
         study.save()
         return study
 

@@ -17,7 +17,7 @@ from ..errors import MuslinError, RolloutFailed
 from ..rollout import Trajectory
 from .problem import Problem
 
-#: Longest time until a worker has loaded its problem [s].
+#: Longest time until a worker has loaded its problem and the simulator is prepared [s].
 START_LIMIT = 300.0
 #: A rollout ends itself at its time limit. One that does not is ended with its process, this much later [s].
 GRACE = 1.0
@@ -156,6 +156,7 @@ def _serve(connection: Connection, file: str) -> None:
     # One thread of linear algebra a process: more only get in each other's way, and the order in which
     # they add up would make results depend on the number of workers.
     with threadpool_limits(1):
+        problem.prepare()
         connection.send(True)
         while True:
             try:

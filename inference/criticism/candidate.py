@@ -104,6 +104,16 @@ def screening_points(
     return np.asarray(points)
 
 
+def newton_point(fit: Polished) -> tuple[FloatArray, float]:
+    """Where a linear model of the residuals has its least square ``(D,)``, inside the cube, and that square.
+
+    Steps of a bounded search from near a bound are short; this looks at what lies behind them.
+    """
+    step = -fit.covariance @ (fit.jacobian.T @ fit.white)
+    left = fit.white + fit.jacobian @ step
+    return np.clip(fit.unit + step, 0.01, 0.99), float(left @ left)
+
+
 def responds(objective: Objective, start: FloatArray, base: int) -> bool:
     """Does anything at all change when every coefficient takes a quarter of its prior range?
 

@@ -18,7 +18,8 @@ class TableTilt(Effect):
     object in them are turned back by the tilt, and what is seen is turned forth again. So it differs from
     :class:`~.gravity.GravityTilt`, where grippers and cameras are as askew as the table: here a hand that moves
     level presses harder where the table rises, by the tilt times the way. A rotation vector without its part
-    about z. Effects that come after it in a list see the frame of the table, 2 degrees off at most.
+    about z. Wind and other nodal forces act in the frame of the table, and so do effects on gravity that come after it
+    in a list and effects on what is seen that come before it: 2 degrees off at most.
     """
 
     name: ClassVar[str] = "table-tilt"

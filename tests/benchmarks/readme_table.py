@@ -1,14 +1,18 @@
-"""Print the README's table of hidden effects from ``results/hidden-small.json``."""
+"""Print the README's tables from what the benchmarks wrote to ``results/``."""
 
 import json
+from typing import Any
 
 from table import RESULTS
 
+SIMULATORS = ("mujoco", "pybullet")
 
-def main() -> None:
+
+def hidden_effects() -> list[str]:
+    """Which effect was hidden, and what was said of it."""
     content = json.loads((RESULTS / "hidden-small.json").read_text())
     rows = {r["figure"]: r["value"] for r in content["rows"]}
-    print("| hidden | verdict | held-out error [mm] |\n|---|---|---|")
+    lines = ["| hidden | verdict | held-out error [mm] |", "|---|---|---|"]
     for figure, told in rows.items():
         if not figure.endswith(": verdict"):
             continue
@@ -16,7 +20,31 @@ def main() -> None:
         verdict, effects = told.split(": ")
         says = verdict if effects == "-" else f"{verdict}: `{effects}`"
         before, after = (rows[f"hidden {hidden}: held-out error {when}"] for when in ("before", "after"))
-        print(f"| {hidden if hidden == 'none' else f'`{hidden}`'} | {says} | {before:.1f} → {after:.1f} |")
+        lines.append(f"| {hidden if hidden == 'none' else f'`{hidden}`'} | {says} | {before:.1f} → {after:.1f} |")
+    return lines
+
+
+def materials() -> list[str]:
+    """Delivered against asked by group of virtual tests: the worst error on the finest mesh, and goals met."""
+    found = {s: json.loads((RESULTS / f"material-{s}.json").read_text())["rows"] for s in SIMULATORS}
+    groups = dict.fromkeys(r["group"] for rows in found.values() for r in rows if r["goal"] is not None)
+    lines = [f"| virtual tests | {' | '.join(f'`{s}`' for s in SIMULATORS)} |", "|---|---|---|"]
+    return lines + [
+        f"| {g} | {' | '.join(_cell([r for r in found[s] if r['group'] == g]) for s in found)} |" for g in groups
+    ]
+
+
+def _cell(rows: list[dict[str, Any]]) -> str:
+    judged = [r for r in rows if r["goal"] is not None and r["claimed"]]
+    if not judged:
+        return "not claimed"
+    errors = [abs(r["error"]) for r in judged if r["error"] is not None and r["asked"]]
+    met = sum(r["status"] == "met" for r in judged)
+    return f"{100 * max(errors):.1f} %, {met} of {len(judged)} met" if errors else f"{met} of {len(judged)} met"
+
+
+def main() -> None:
+    print("\n".join([*hidden_effects(), "", *materials()]))
 
 
 if __name__ == "__main__":

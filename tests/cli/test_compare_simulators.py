@@ -21,6 +21,7 @@ def test_one_command_writes_report_and_figures(muslin: Muslin, tmp_path: Path) -
     assert figures["pairs"][0]["median_difference_m"] < 0.02
     page = (tmp_path / "page.html").read_text()
     assert page.count("<svg") >= 3 and page.count("data:image/png") == 2
+    assert "built-in method" not in page and page.count("stretch_stiffness 1") == 2  # the values of both draws shown
     assert "http" not in page.replace("http://www.w3.org", "")
 
 

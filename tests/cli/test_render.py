@@ -86,6 +86,7 @@ def test_a_study_is_drawn_at_its_own_times_with_a_camera_file(study: Path, capsy
         (("--renderer", "tiyn"), "Did you mean 'tiny'"),
         (("--simulator", "mujocco"), "Did you mean 'mujoco'"),
         (("--fps", "0"), "--fps must be"),
+        (("--fps", "0.1"), "one frame of a motion of 2 s"),
         (("--recording", "one"), "goes with a study"),
         (("-o", "no/out"), "there is no folder"),
         (("-o", "bad.toml"), "exists already"),

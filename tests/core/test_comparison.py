@@ -9,6 +9,7 @@ import pytest
 from muslin.core.comparison import compare_simulators
 from muslin.core.errors import InputError, RolloutFailed
 from muslin.core.material import ClothMaterial
+from muslin.core.obstacles import Table
 from muslin.core.parameters import Parameter
 from muslin.core.scenarios import preset
 from muslin.core.scene import Scene
@@ -94,6 +95,12 @@ def test_draws_are_the_same_every_time_and_fill_the_prior(hanging):
 
 
 def test_what_cannot_be_compared_is_said(hanging):
+    class Bare(ReferenceSimulator):
+        name: ClassVar[str] = "bare"
+        capabilities: ClassVar[frozenset[str]] = frozenset()
+
+    with pytest.raises(InputError, match="'bare' cannot carry the object on a table"):
+        run(replace(hanging, obstacles=(Table(0.0),)), ReferenceSimulator(), Bare())
     with pytest.raises(InputError, match="at least two different"):
         run(hanging, ReferenceSimulator())
     with pytest.raises(InputError, match="at least two different"):

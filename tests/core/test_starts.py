@@ -74,6 +74,13 @@ def test_a_cable_starts_between_its_grippers_wherever_they_are() -> None:
         np.testing.assert_allclose(held[0], start[[0, 1, -2, -1]], atol=1e-12)
 
 
+def test_a_cable_needs_two_grippers() -> None:
+    scenario = preset("cable").scenario()
+    one = replace(scenario, grasps=scenario.grasps[:1], motion=Motion.still())
+    with pytest.raises(InputError, match="poses of both"):
+        one.start_vertices()
+
+
 def test_a_cable_leaves_a_gripper_along_its_turn() -> None:
     """Two vertices an end: what a gripper turns by, the first segment turns by."""
     scenario = preset("cable").scenario()

@@ -68,6 +68,14 @@ def test_values_of_the_wrong_kind() -> None:
     assert "[noise.sd]" in complaint(noise={"sd": -1.0})
 
 
+def test_obstacles_that_are_none() -> None:
+    rod = {"kind": "cylinder", "center": [0, 2], "axis": [0, 1, 0], "radius": 0.1, "length": 0.3}
+    assert "Did you mean 'cylinder'" in complaint(scenario__obstacles=[rod | {"kind": "cylnder"}])
+    assert "kind is missing. Kinds: table, cylinder, mesh" in complaint(scenario__obstacles=[{"height": 0.0}])
+    assert "must be a list" in complaint(scenario__obstacles={"kind": "table", "height": 0.0})
+    assert "cylinder.center] has too few numbers; got [0, 2]" in complaint(scenario__obstacles=[rod])
+
+
 def test_recordings() -> None:
     both = complaint(study__fit_on=["a"], study__hold_out=["a"])
     assert "recording a is both fitted on and held out" in both
@@ -90,6 +98,9 @@ def test_effects() -> None:
     problem = build_problem(config, measurement())
     assert problem.fixed == {"air-drag.drag_coefficient": 1.2}
     assert problem.space.names[-1] == "air-drag.lift_coefficient"
+    assert "[effects.adhesion]" in complaint(effects={"adhesion": {}}) and "no obstacle" in complaint(
+        effects={"adhesion": {}}
+    )
 
 
 def test_what_the_mesh_does_not_have() -> None:

@@ -112,6 +112,14 @@ def test_a_rope_from_a_file(folder: Path) -> None:
     assert problem.space.units == ("N m2", "N")
 
 
+@pytest.mark.parametrize("held", [0, 4, 8])
+def test_a_rope_that_is_scaled_stays_in_its_gripper(folder: Path, held: int) -> None:
+    table = {"name": "swing", "mesh": "rope.csv", "vertices": [9], "grasps": [[held]]}
+    for straight in (False, True):
+        scenario = built(folder, 9, straight_rest=straight, **table).scenarios["a"]
+        np.testing.assert_allclose(scenario.start_vertices(1.5)[held], scenario.start_vertices()[held], atol=1e-12)
+
+
 def test_the_material_and_the_priors_of_a_scenario(folder: Path) -> None:
     thick = built(folder, 9, name="wiping", vertices=[3, 3], material={"areal_density": 0.7})
     assert (thick.material.areal_density, thick.material.stretch_stiffness) == (0.7, 2000.0)  # type: ignore[union-attr]
@@ -165,7 +173,7 @@ def test_obstacles(folder: Path) -> None:
         kind="table", height=0.0, heigth=1.0
     )
     assert "[scenario.obstacles.0.table.height] is missing" in refused(kind="table")
-    assert "'table', 'cylinder', 'mesh'" in refused(kind="ball")
+    assert "no obstacle of kind 'ball'. Kinds: table, cylinder, mesh" in refused(kind="ball")
     assert "there is no mesh" in refused(kind="mesh", file="nix.stl")
     assert "must be closed" in refused(kind="mesh", file="sheet.obj")
     assert "cannot start like this: the object is" in refused(kind="table", height=0.85)

@@ -72,7 +72,7 @@ def test_the_same_study_runs_on_the_other_engine_by_changing_one_word(tmp_path: 
 
 
 def test_candidates_are_the_installed_effects_that_are_not_in_yet(small_study: Study) -> None:
-    from muslin.inference.criticism.diagnose import candidate_names
+    from muslin.inference.criticism.candidate_names import candidate_names
 
     names = candidate_names(small_study)
     assert {"air-drag", "wind", "viscous-damping", "internal-damping", "gravity-tilt", "actuator-lag"} <= set(names)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from muslin.backends.mujoco.simulator import MujocoSimulator
 from muslin.core.arrays import FloatArray
 from muslin.core.effect import Effect, NodalForce
 from muslin.core.errors import InputError, MuslinError
@@ -122,6 +123,24 @@ def test_a_hang_costs_its_time_limit_and_no_more(small_study: Study) -> None:
         list(pool.map([harm("hang")]))
         took = time.monotonic() - began
     assert 1.0 <= took < 1.0 + GRACE + 1.0
+
+
+class SlowToPrepare(MujocoSimulator):
+    """Compiles for a while in every process, and then says that it could not."""
+
+    def prepare(self, scene: Scene) -> None:
+        time.sleep(3.0)
+        raise RuntimeError("no compiler")
+
+
+@pytest.mark.parametrize("workers", [0, 1])
+def test_what_a_simulator_does_once_in_a_process_is_not_counted(small_study: Study, workers: int) -> None:
+    problem = replace(small_study.problem, simulator=SlowToPrepare(), time_limit=1.5)
+    began = time.monotonic()
+    with SimulationPool(problem, workers) as pool:
+        outcomes = [*pool.map([Task(VALUES, "near")]), *pool.map([Task(VALUES, "near")])]
+    assert all(isinstance(o, Trajectory) for o in outcomes)
+    assert time.monotonic() - began > 3.0
 
 
 def test_between_steps_the_time_limit_holds_in_this_process_too(small_study: Study) -> None:

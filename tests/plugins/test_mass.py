@@ -1,5 +1,7 @@
 """Hems and wet patches: where their mass is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_objects import LYING, ROPE, SHEET, cases, vertices
@@ -10,6 +12,7 @@ from hypothesis.extra import numpy as hnp
 from muslin.core.body import Body, rope_line
 from muslin.core.material import ClothMaterial, RopeMaterial
 from muslin.plugins.effects.mass import Hem, WetPatch, boundary_edges, share_below
+from muslin.plugins.effects.observation import rotation_matrix
 
 NOTHING = np.zeros(20)
 
@@ -50,6 +53,14 @@ def test_water_is_the_uptake_of_the_wet_share(body, material, extent):
     axis = 2 if body is SHEET else 1
     far = body.vertices[:, axis] > body.vertices[:, axis].min() + extent * 0.1 + 0.1 / 3 + 1e-9
     np.testing.assert_array_equal(loads[far], 0.0)
+
+
+@pytest.mark.parametrize("tilt", [1e-5, -0.03])
+def test_a_sheet_that_a_real_gripper_holds_almost_level_is_wet_where_a_level_one_is(tilt):
+    askew = replace(LYING, vertices=LYING.vertices @ rotation_matrix(np.array([0.0, tilt, 0.0])).T)
+    wet = WetPatch(uptake=0.8, extent=0.4)
+    level, tilted = (wet.on_loads(body, ClothMaterial(), NOTHING) for body in (LYING, askew))
+    np.testing.assert_allclose(tilted, level, atol=1e-12)
 
 
 @pytest.mark.parametrize("extent", [0.3, 1.0])

@@ -45,8 +45,8 @@ def test_bending_rigidity_matters_and_zero_of_it_is_a_membrane():
 
 
 @pytest.mark.parametrize("time_step", [0.002, 0.004])
-def test_a_swinging_strip_loses_little_more_than_implicit_euler(time_step):
-    """Shells keep the full h w^2 / 2, and a swing as a whole has it too, since tension carries the strip."""
+def test_a_swinging_strip_loses_a_fifth_at_most_of_what_implicit_euler_takes(time_step):
+    """That would be h w^2 / 2: the theta method takes a 19th of it, and terms that MuJoCo leaves out the rest."""
     body = cloth_grid(0.04, 0.2, 2, 6)
     cos, sin = np.cos(0.1), np.sin(0.1)
     turned = body.vertices @ np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
@@ -59,4 +59,4 @@ def test_a_swinging_strip_loses_little_more_than_implicit_euler(time_step):
             path.append(world.state().positions[-2:, 1].mean())
     frequency, rate = swing(time_step, np.array(path))
     assert frequency == pytest.approx(np.sqrt(1.5 * G / 0.2), rel=0.02)
-    assert 0.0 < rate < 1.25 * time_step * frequency**2 / 2 + 0.05
+    assert 0.0 < rate < 0.2 * time_step * frequency**2 / 2

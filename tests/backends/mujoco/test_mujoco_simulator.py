@@ -112,9 +112,12 @@ def test_a_table_carries_a_sheet_and_friction_holds_it():
 
 
 def test_a_warning_fails_the_rollout_with_mujocos_words():
-    said = r"MuJoCo warned at 0\.00[0-9]+ s: Nan, Inf or huge value in QACC"
-    with opened(scene(SMALL_CLOTH, ClothMaterial())) as world, pytest.raises(RolloutFailed, match=said):
-        world.step(NOWHERE, np.full((16, 3), 1e12))
+    said = r"MuJoCo warned 0\.055 s after the start: Nan, Inf or huge value in QACC"
+    with opened(scene(SMALL_CLOTH, ClothMaterial())) as world:
+        for _ in range(10):
+            world.step(NOWHERE, None)
+        with pytest.raises(RolloutFailed, match=said):
+            world.step(NOWHERE, np.full((16, 3), 1e12))
 
 
 @pytest.mark.parametrize("vertex", [0, 5])
