@@ -36,6 +36,7 @@ def compare_simulators(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Write the figures here, too.")
     ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
     workers: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; default one a core.")] = None,
 ) -> None:
     """Run the same draws on several simulators and report how far apart they are, where, and when."""
@@ -49,7 +50,7 @@ def compare_simulators(
     base = preset(scenario)
     for file in (target, json_file):
         if file is not None:
-            check_output(file, force=True)
+            check_output(file, force)
     names = [s.strip() for s in simulators.split(",") if s.strip()]
     space = None if parameter is None else [_parameter(p, base.kind) for p in parameter]
     with ProgressView() as progress:
