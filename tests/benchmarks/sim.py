@@ -1,6 +1,7 @@
 """How fast rollouts are, always against something else in the same run.
 
-(a) muslin's MuJoCo rollout against a bare ``mj_step`` loop of the same model under the same motion;
+(a) muslin's MuJoCo rollout, with building its model and the bending that is not in it, against a bare ``mj_step`` loop
+of the same model under the same motion;
 (b) muslin's PyBullet rollout against a stock pybullet loop of the same mesh (stepSimulation at the same substep,
 getMeshData at every observation); (c) 2 worker processes against 1; (d) cost against vertices; (e) frames rendered
 a second; (f) how far time steps are from small ones, and the engines from each other::
