@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,6 +38,9 @@ def bending_matrix(body: Body, held: IntArray, weft_ratio: float = 1.0) -> Float
         held: indices ``(H,)`` of the held vertices.
         weft_ratio: bending rigidity along the weft over that along the warp [1].
 
+    Returns:
+        The matrix, not to be written to: the last few are kept.
+
     Raises:
         InputError: a triangle has no area, or more than two triangles meet in an edge.
 
@@ -44,7 +48,28 @@ def bending_matrix(body: Body, held: IntArray, weft_ratio: float = 1.0) -> Float
         Grinspun, Gingold, Reisman and Zorin, *Computing discrete shape operators on general meshes*, 2006;
         Wardetzky, Bergou, Harmon, Zorin and Grinspun, *Discrete quadratic curvature energies*, 2007.
     """
-    sheet = _sheet(body, held, weft_ratio)
+    return _matrix(_Alike(body), held.astype(np.int64).tobytes(), weft_ratio)
+
+
+class _Alike:
+    """A surface that equals every other of the same numbers."""
+
+    def __init__(self, body: Body) -> None:
+        assert body.warp is not None
+        self.body = body
+        self._key = tuple((a.shape, a.tobytes()) for a in (body.vertices, body.elements, body.warp))
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Alike) and self._key == other._key
+
+
+@lru_cache(maxsize=4)  # rollouts of one study share it unless they scale the object
+def _matrix(alike: _Alike, held: bytes, weft_ratio: float) -> FloatArray:
+    body = alike.body
+    sheet = _sheet(body, np.frombuffer(held, np.int64), weft_ratio)
     count = len(body.vertices)
     columns = [[0, 1, 2, 3], [1, 2, 0, 4], [2, 0, 1, 5]]
     shape = np.zeros((len(body.elements), 3, 6))
@@ -59,7 +84,9 @@ def bending_matrix(body: Body, held: IntArray, weft_ratio: float = 1.0) -> Float
         smooth = np.zeros((len(vertices), 3))
         np.add.at(smooth, where.ravel(), np.einsum("ekl,eli->eik", mix, shape[around]).reshape(-1, 3))
         matrix[np.ix_(vertices, vertices)] += smooth @ form @ smooth.T
-    return matrix[:count, :count]
+    matrix = matrix[:count, :count]
+    matrix.flags.writeable = False
+    return matrix
 
 
 def rest_folds(body: Body, held: IntArray, weft_ratio: float = 1.0) -> tuple[IntArray, FloatArray]:

@@ -127,7 +127,7 @@ def rollout(
     finally:
         world.close()
     vertices = interpolate(np.maximum(seen, start), clock[settle_steps:], path)
-    points = np.einsum("mv,tva->tma", scenario.markers, vertices)
+    points: FloatArray = scenario.markers @ vertices
     for effect in active:
         points = effect.on_points(points)
     series, poses = PointSeries(scenario.times, points), scenario.motion.at(scenario.times)

@@ -63,6 +63,8 @@ class MujocoWorld(World):
         self._state = State(self._positions, self._velocities, self._contact_forces if scene.obstacles else None)
         self._loaded = self._stretched = False
         self._before = np.empty_like(self._qpos), np.empty_like(self._qvel)
+        # of positions and velocities: now, and before the step that is thrown on
+        self._thrown = [(self._qpos[:count], self._before[0][:count]), (self._qvel[:count], self._before[1][:count])]
         self._damping_time = scene.material.damping_time
         self._touching = False
         self._elapsed = 0.0  # MuJoCo's own clock runs at the pace of its own steps
@@ -148,11 +150,10 @@ class MujocoWorld(World):
         if self._data.ncon:
             qpos[:], qvel[:] = x, v
             return False
-        count = len(self._moved)
-        for now, before in ((qpos[:count], x[:count]), (qvel[:count], v[:count])):
-            now *= 1 + self._overshoot
-            before *= self._overshoot
-            now -= before
+        for now, was in self._thrown:
+            np.subtract(now, was, out=was)
+            was *= self._overshoot
+            now += was
         return True
 
     def _pace(self, step: float) -> None:
@@ -181,5 +182,4 @@ class MujocoWorld(World):
         return forces if self._turn is None else np.asarray(forces @ self._turn.T)
 
     def close(self) -> None:
-        for name in ("state", "qpos", "qvel", "warnings", "moved", "push", "touch", "stretch", "data", "model"):
-            delattr(self, f"_{name}")
+        vars(self).clear()  # views into the engine's memory go with the engine
