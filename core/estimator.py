@@ -12,6 +12,11 @@ from .arrays import FloatArray
 class Posterior(ABC):
     """A density on the unit cube of a parameter space. Points are vectors ``(N, D)`` in ``[0, 1]``."""
 
+    @property
+    @abstractmethod
+    def dim(self) -> int:
+        """D, the number of parameters."""
+
     @abstractmethod
     def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
         """``(count, D)`` draws, all inside the unit cube."""

@@ -15,9 +15,9 @@ from ...core.scenario import Scenario
 from ...core.series import PointSeries
 from ...core.store import put, storage_errors
 from ...core.study import Outcome, Study, Task
-from ..fitting import load_fit, offsets_of
 from ..noise import Noise
 from ..residuals import Residual, residual
+from ..sequential.fitting import load_fit, offsets_of
 
 #: Posterior draws that are simulated for the scatter of predictions.
 PREDICTIVE = 8

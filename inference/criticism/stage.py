@@ -9,9 +9,9 @@ from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import Problem, SimulationPool, Study, Task
-from ..fitting import FitResult, offsets_of
 from ..polish import Objective, Polished, polish
 from ..residuals import residual
+from ..sequential.fitting import FitResult, offsets_of
 from .candidate import (
     Candidate,
     best_starts,

@@ -6,8 +6,8 @@ from muslin.core.testing import estimators as kit
 
 torch = pytest.importorskip("torch")
 
-from muslin.inference.bayessim_rkhs import BayesSimRKHS  # noqa: E402
-from muslin.inference.training import importance_weights  # noqa: E402
+from muslin.inference.density.training import importance_weights  # noqa: E402
+from muslin.inference.estimators.bayessim_rkhs import BayesSimRKHS  # noqa: E402
 
 
 def quick(**options: object) -> BayesSimRKHS:

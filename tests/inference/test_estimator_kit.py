@@ -18,6 +18,7 @@ class GridPosterior(Posterior):
     """A density that is constant on the cells of a 200 x 200 grid: all answers exact, numpy alone."""
 
     size = 200
+    dim = 2
 
     def __init__(self, mass: FloatArray) -> None:
         self.mass = mass / mass.sum()

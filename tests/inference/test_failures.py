@@ -14,7 +14,7 @@ from muslin.core.material import Material
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.core.registry import REGISTRY
 from muslin.core.study import Study
-from muslin.inference.failures import (
+from muslin.inference.sequential.failures import (
     failure_notes,
     reasons_text,
     region_text,
@@ -131,10 +131,12 @@ def test_leaving_failures_out_leaves_the_posterior_elsewhere_as_it_is() -> None:
     The weighted mean of what is kept is that of the posterior restricted to where draws succeed.
     """
     from muslin.core.estimator import Posterior
-    from muslin.inference.proposals import log_weights, propose
+    from muslin.inference.sequential.proposals import log_weights, propose
 
     class Narrow(Posterior):
         """Triangular on [0, 1], highest at 1."""
+
+        dim = 1
 
         def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
             return np.sqrt(rng.random((count, 1)))

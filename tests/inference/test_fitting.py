@@ -17,9 +17,9 @@ from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreE
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
-from muslin.inference.doubts import doubts
 from muslin.inference.noise import Noise
-from muslin.inference.only_one import only_one
+from muslin.inference.sequential.doubts import doubts
+from muslin.inference.sequential.only_one import only_one
 
 pytest.importorskip("mujoco")
 

@@ -8,7 +8,7 @@ from muslin.core.testing import estimators as kit
 
 pytest.importorskip("scipy")
 
-from muslin.inference.mixture import MixturePosterior
+from muslin.inference.posterior.mixture import MixturePosterior
 
 
 def some(seed: int = 0, dim: int = 2, push: float = 1.0) -> MixturePosterior:

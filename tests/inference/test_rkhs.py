@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch")
 
-from muslin.inference.components import PrincipalComponents  # noqa: E402
-from muslin.inference.points import PointScaler  # noqa: E402
-from muslin.inference.ridge import KernelRidge  # noqa: E402
-from muslin.inference.rkhs import RKHSEmbedding  # noqa: E402
+from muslin.inference.embedding.components import PrincipalComponents  # noqa: E402
+from muslin.inference.embedding.points import PointScaler  # noqa: E402
+from muslin.inference.embedding.ridge import KernelRidge  # noqa: E402
+from muslin.inference.embedding.rkhs import RKHSEmbedding  # noqa: E402
 
 LAYER = RKHSEmbedding(2, 2000, 1.0, torch.Generator().manual_seed(0))
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.arrays import BoolArray, FloatArray
-from ..core.errors import InputError
+from ...core.arrays import BoolArray, FloatArray
+from ...core.errors import InputError
 
 # Standardised coordinates beyond this are pulled back to it, so that one exploded draw rules no mean or basis.
 _LIMIT = 12.0

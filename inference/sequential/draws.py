@@ -6,11 +6,11 @@ from typing import Any, cast
 import numpy as np
 import zarr
 
-from ..core.arrays import BoolArray, FloatArray, IntArray
-from ..core.errors import StoreError
-from ..core.rollout import Trajectory
-from ..core.store import damage_errors, empty_draws, put, storage_errors
-from ..core.study import Outcome, Problem, Study
+from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.errors import StoreError
+from ...core.rollout import Trajectory
+from ...core.store import damage_errors, empty_draws, put, storage_errors
+from ...core.study import Outcome, Problem, Study
 
 ABSENT, WHOLE, FAILED = 0, 1, 2
 

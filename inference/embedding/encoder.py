@@ -4,8 +4,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.arrays import FloatArray
-from ..core.errors import InputError
+from ...core.arrays import FloatArray
+from ...core.errors import InputError
 from .components import PrincipalComponents
 from .points import PointScaler
 from .rkhs import RKHSEmbedding

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..core.arrays import FloatArray
-from ..core.estimator import Posterior
+from ...core.arrays import FloatArray
+from ...core.estimator import Posterior
 
 #: Share of every later round's proposal that is still the prior. It bounds the importance weights
 #: p / p~ by the inverse of the prior's share of all draws.

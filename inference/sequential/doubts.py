@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..core.arrays import FloatArray
-from ..core.parameters import ParameterSpace
-from ..core.rollout import Trajectory
-from ..core.study import SimulationPool, Task
-from .noise import Noise
+from ...core.arrays import FloatArray
+from ...core.parameters import ParameterSpace
+from ...core.rollout import Trajectory
+from ...core.study import SimulationPool, Task
+from ..noise import Noise
 
 #: A change of the parameters this small [relative] must not be seen in the prediction.
 NUDGE = 1e-9

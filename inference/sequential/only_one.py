@@ -6,8 +6,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from ..core.errors import MuslinError
-from ..core.store import storage_errors
+from ...core.errors import MuslinError
+from ...core.store import storage_errors
 
 
 @contextlib.contextmanager

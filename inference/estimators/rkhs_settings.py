@@ -1,9 +1,6 @@
-"""Options of the estimator, and the presets they start from."""
+"""Options of ``bayessim-rkhs``, and the presets they start from."""
 
-from dataclasses import dataclass, fields, replace
-from typing import Any
-
-from ..core.errors import InputError
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
@@ -67,36 +64,3 @@ PRESETS: dict[str, Settings] = {
         summaries=False,
     ),
 }
-
-
-def settings(preset: str, options: dict[str, Any]) -> Settings:
-    """A preset with options put over it.
-
-    Raises:
-        InputError: an unknown preset or option, or a value out of range.
-    """
-    if preset not in PRESETS:
-        raise InputError(f"bayessim-rkhs has no preset {preset!r}; it has {', '.join(PRESETS)}")
-    base = PRESETS[preset]
-    known = {f.name: f for f in fields(Settings)}
-    for name, value in options.items():
-        if name not in known:
-            raise InputError(f"bayessim-rkhs has no option {name!r}; it has correspondence, {', '.join(known)}")
-        default = getattr(base, name)
-        if isinstance(default, tuple):
-            value = tuple(int(v) for v in value)
-            if not value or min(value) < 1:
-                raise InputError(f"bayessim-rkhs: {name} must be a list of widths above zero, not {list(value)}")
-        elif not isinstance(default, bool):
-            zero_allowed = name in ("patience", "frames", "points", "summary_decay")
-            if (
-                isinstance(value, bool)
-                or not isinstance(value, int | float)
-                or value < 0
-                or not (value or zero_allowed)
-            ):
-                low = "zero or more" if zero_allowed else "above zero"
-                raise InputError(f"bayessim-rkhs: {name} must be a number {low}, not {value!r}")
-            value = type(default)(value)
-        base = replace(base, **{name: value})
-    return base

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor, nn
 
-from .density import MixtureHead, mixture_log_prob
-from .rkhs import RKHSEmbedding
+from ..embedding.rkhs import RKHSEmbedding
+from .mixture_head import MixtureHead, mixture_log_prob
 from .training import DensityNetwork
 
 Mixture = tuple[Tensor, Tensor, Tensor]

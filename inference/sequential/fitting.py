@@ -9,24 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arrays import FloatArray, IntArray
-from ..core.errors import InputError, MuslinError
-from ..core.estimator import Posterior, PosteriorEstimator
-from ..core.measurement import Recording
-from ..core.parameters import ParameterSpace
-from ..core.registry import REGISTRY
-from ..core.series import PointSeries
-from ..core.store import damage_errors, put, read, storage_errors
-from ..core.study import Study, Task
+from ...core.arrays import FloatArray, IntArray
+from ...core.errors import InputError, MuslinError
+from ...core.estimator import Posterior, PosteriorEstimator
+from ...core.measurement import Recording
+from ...core.parameters import ParameterSpace
+from ...core.registry import REGISTRY
+from ...core.series import PointSeries
+from ...core.store import damage_errors, put, read, storage_errors
+from ...core.study import Study, Task
+from ..noise import Noise, estimate_noise
+from ..observe import Observer
+from ..polish import Objective, polish
+from ..residuals import Offsets, residual
 from .doubts import doubts
 from .draws import ABSENT, FAILED, WHOLE, DrawStore
 from .failures import failure_notes, reasons_text, region_text
-from .noise import Noise, estimate_noise
-from .observe import Observer
 from .only_one import only_one
-from .polish import Objective, polish
 from .proposals import log_weights, propose
-from .residuals import Offsets, residual
 
 #: So many draws of the first round, and not one of them whole, end a fit at once.
 HOPELESS = 20

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from scipy.special import logsumexp, ndtr, ndtri
 
-from ..core.arrays import FloatArray
-from ..core.errors import InputError, MissingFileError
-from ..core.estimator import Posterior
+from ...core.arrays import FloatArray
+from ...core.errors import InputError, MissingFileError
+from ...core.estimator import Posterior
 
 # Below this distance from a face of the cube the probit is taken at this distance: |z| stays below 7.1.
 _EDGE = 1e-12

@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.arrays import FloatArray
-from ..core.errors import InputError
+from ...core.arrays import FloatArray
+from ...core.errors import InputError
 
 
 class DensityNetwork(torch.nn.Module, ABC):

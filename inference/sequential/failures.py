@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.arrays import BoolArray, FloatArray
-from ..core.parameters import Parameter, ParameterSpace
+from ...core.arrays import BoolArray, FloatArray
+from ...core.parameters import Parameter, ParameterSpace
 
 #: A region of failures that holds more than this share of the whole draws says nothing.
 TELLING = 0.5

@@ -8,19 +8,21 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..core.arrays import FloatArray
-from ..core.errors import InputError, StepMissingError
-from ..core.estimator import PosteriorEstimator
-from .density import mixture_log_prob
-from .encoder import Encoder
-from .mixture import MixturePosterior
-from .networks import SummaryNetwork, TrajectoryNetwork
-from .rkhs import RKHSEmbedding
-from .settings import settings
-from .summaries import Summaries, probit
-from .training import importance_weights, isolated, train
+from ...core.arrays import FloatArray
+from ...core.errors import StepMissingError
+from ...core.estimator import PosteriorEstimator
+from ..density.mixture_head import mixture_log_prob
+from ..density.networks import SummaryNetwork, TrajectoryNetwork
+from ..density.training import isolated, train
+from ..embedding.encoder import Encoder
+from ..embedding.rkhs import RKHSEmbedding
+from ..embedding.summaries import Summaries, probit
+from ..posterior.mixture import MixturePosterior
+from .inputs import checked, flags_of, measured
+from .options import with_options
+from .rkhs_settings import PRESETS
 
-_MIN_DRAWS = 10
+_MAY_BE_ZERO = ("patience", "frames", "points", "summary_decay")
 # Part of the mass in a copy of the mixture this much wider, so that the few draws in its tail do not widen it all.
 _TAILS = (0.001, 0.01, 0.03, 0.06, 0.1, 0.2)
 _TAIL_WIDTH = 3.0
@@ -40,10 +42,10 @@ class BayesSimRKHS(PosteriorEstimator):
 
     - points are standardised by the training draws, and the size of each set stands beside its mean;
     - the mixture lives in probit coordinates of the unit cube, so no mass leaves the prior's bounds;
-    - corresponding points enter the kernel with a code of their identity (:class:`~.encoder.Encoder`);
+    - corresponding points enter the kernel with a code of their identity (:class:`~..embedding.encoder.Encoder`);
     - the layer is learned on some frames, then every frame is embedded with it, and the embedded trajectory is
-      summarised by principal components and kernel ridge regression (leave-one-out, :mod:`~.ridge`); where points
-      correspond, so are their displacements;
+      summarised by principal components and kernel ridge regression (leave-one-out,
+      :mod:`~..embedding.ridge`); where points correspond, so are their displacements;
     - several small networks, each stopped early on draws that it leaves out, turn the summaries into mixtures,
       which are averaged; one scale of all standard deviations, and the mass in a wider copy of the mixture, are set
       on the left-out draws.
@@ -55,7 +57,7 @@ class BayesSimRKHS(PosteriorEstimator):
         correspondence: whether point p is the same spot of the object in every frame and draw: one flag, or one a
             recording. Without it, the order of the points has no influence, to the last bit.
         preset: ``"default"`` or ``"paper"``.
-        options: any field of :class:`~.settings.Settings`, put over the preset.
+        options: any field of :class:`~.rkhs_settings.Settings`, put over the preset.
 
     Raises:
         InputError: an unknown preset or option, or a value out of range.
@@ -67,7 +69,7 @@ class BayesSimRKHS(PosteriorEstimator):
         self, *, correspondence: bool | Sequence[bool] = True, preset: str = "default", **options: Any
     ) -> None:
         self.correspondence = correspondence
-        self.settings = settings(preset, options)
+        self.settings = with_options(self.name, PRESETS, preset, options, _MAY_BE_ZERO)
         self._encoder: Encoder | None = None
         self._summaries: Summaries | None = None
         self._members: list[SummaryNetwork] = []
@@ -80,16 +82,16 @@ class BayesSimRKHS(PosteriorEstimator):
         Args:
             theta: ``(N, D)`` in the unit cube.
             x: ``(N, T_r, P, A)`` a recording; NaN = not seen.
-            log_weights: ``(N,)``; see :func:`~.training.importance_weights` for how they are used. Draws of weight
-                zero are left out.
+            log_weights: ``(N,)``; see :func:`~..density.training.importance_weights` for how they are used. Draws of
+                weight zero are left out.
             seed: of everything random; the same draws and seed give the same posterior to the bit.
 
         Raises:
             InputError: fewer than 10 draws, shapes that do not fit, parameters outside the unit cube, draws in
                 which nothing was seen, or weights that make no sense.
         """
-        theta, x, weights = _checked(theta, x, log_weights)
-        flags = _flags(self.correspondence, len(x))
+        theta, x, weights = checked(theta, x, log_weights)
+        flags = flags_of(self.correspondence, len(x))
         with isolated(seed, self.settings.threads) as generator:
             self._fit(theta, x, flags, weights, generator)
 
@@ -177,14 +179,9 @@ class BayesSimRKHS(PosteriorEstimator):
         """
         if self._encoder is None:
             raise StepMissingError("bayessim-rkhs has no posterior before fit")
-        measured = [np.asarray(a, float)[None] for a in x]
-        for r, a in enumerate(measured):
-            if a.ndim != 4:
-                raise InputError(f"recording {r} of a measurement needs shape (T, P, A), but has {a.shape[1:]}")
-            if not np.isfinite(a).all(axis=3).any():
-                raise InputError(f"recording {r} of the measurement has no point that was seen")
+        batch = measured(x)
         with isolated(0, self.settings.threads), torch.no_grad():
-            points, seen = self._encoder.points(measured)
+            points, seen = self._encoder.points(batch)
             if self._summaries is None:
                 s = self.settings
                 inputs, masks = self._encoder.coded(points, seen, s.frames, s.points)
@@ -206,48 +203,3 @@ def _mixture(outputs: tuple[Tensor, Tensor, Tensor], widening: float = 1.0) -> M
     inverse = widening * torch.linalg.inv(factors)
     # N(m, (P^T P)^-1): the covariance is P^-1 P^-T, and P^-1 is lower triangular like P.
     return MixturePosterior(log_weights.exp().numpy(), means.numpy(), inverse.numpy())
-
-
-def _flags(correspondence: bool | Sequence[bool], recordings: int) -> tuple[bool, ...]:
-    if isinstance(correspondence, bool):
-        return (correspondence,) * recordings
-    flags = tuple(bool(c) for c in correspondence)
-    if len(flags) != recordings:
-        raise InputError(f"correspondence names {len(flags)} recordings, but there are {recordings}")
-    return flags
-
-
-def _checked(
-    theta: FloatArray, x: list[FloatArray], log_weights: FloatArray | None
-) -> tuple[FloatArray, list[FloatArray], FloatArray]:
-    """Draws of weight above zero, after everything that could be wrong was looked for."""
-    theta = np.asarray(theta, float)
-    if theta.ndim != 2 or theta.shape[1] == 0:
-        raise InputError(f"theta must have shape (N, D), but has {theta.shape}")
-    if not (np.isfinite(theta).all() and (theta >= 0).all() and (theta <= 1).all()):
-        raise InputError("theta must lie in the unit cube; map values with ParameterSpace.to_unit")
-    draws = len(theta)
-    if not x:
-        raise InputError("x needs at least one recording")
-    x = [np.asarray(a, float) for a in x]
-    for r, a in enumerate(x):
-        if a.ndim != 4 or len(a) != draws or 0 in a.shape[1:]:
-            raise InputError(f"recording {r} must have shape ({draws}, T, P, A), but has {a.shape}")
-        if a.shape[3] != x[0].shape[3]:
-            raise InputError(f"recordings must share their axes, but have {[b.shape[3] for b in x]}")
-        if np.isinf(a).any():
-            raise InputError(f"recording {r} holds an infinite coordinate; leave failed draws out")
-        empty = np.flatnonzero(~np.isfinite(a).all(axis=3).reshape(draws, -1).any(axis=1))
-        if len(empty):
-            raise InputError(
-                f"in recording {r}, {len(empty)} of {draws} draws have no point that was seen "
-                f"(the first is draw {empty[0]}); leave failed draws out before fitting"
-            )
-    weights = importance_weights(log_weights, draws)
-    kept = weights > 1e-8
-    if kept.sum() < _MIN_DRAWS:
-        raise InputError(
-            f"{int(kept.sum())} draws with a weight above zero are too few to train on; at least {_MIN_DRAWS} are "
-            "needed, and some hundreds are sensible"
-        )
-    return theta[kept], [a[kept] for a in x], weights[kept] / weights[kept].mean()

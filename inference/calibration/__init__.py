@@ -1,0 +1,1 @@
+"""Whether posteriors keep their promises: ranks, coverage, and predictions held against the measurement."""

@@ -1,0 +1,1 @@
+"""Conditional densities and how they are trained."""

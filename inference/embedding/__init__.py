@@ -1,0 +1,1 @@
+"""From point series to numbers: standardised points, kernel mean embeddings, summaries."""

@@ -1,0 +1,1 @@
+"""The step ``fit``: rounds of simulation and inference."""
