@@ -1,10 +1,8 @@
 """``muslin render``: pictures of a simulated motion."""
 
 import os
-import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +21,7 @@ from ..core.rollout import rollout
 from ..core.scenario import STANDARD_GRAVITY
 from ..core.scenarios import PRESETS, preset
 from ..core.scene import Scene
-from ..core.store import read, storage_errors
+from ..core.store import new_folder, read
 from ..core.study import Problem, Study
 from .console import ProgressView, say
 from .images import millimetres, read_image, write_image
@@ -83,7 +81,9 @@ def render(
         progress(f"simulating {what}", 0, 0)
         scene, times, vertices = _simulated(what, simulator, recording, fps)
         lens = lens or Camera.framing(vertices)
-        with _new_folder(output) as folder:
+        with new_folder(output) as folder:
+            for kind in _KINDS:
+                (folder / kind).mkdir()
             began = time.perf_counter()
             for k, frame in enumerate(_frames(drawer, scene, vertices, lens, look)):
                 _write(folder, k, frame)
@@ -170,20 +170,3 @@ def _check_folder(path: Path, force: bool) -> None:
         raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
     if path.exists() and not ((path / "camera.toml").is_file() and (path / "rgb").is_dir()):
         raise InputError(f"{path} exists and was not written by muslin render; it is not replaced")
-
-
-@contextmanager
-def _new_folder(path: Path) -> Iterator[Path]:
-    """A folder that appears at ``path`` when the block ends well, and leaves nothing behind otherwise."""
-    partial = path.absolute().with_name(f".{path.absolute().name}.{os.getpid()}.partial")
-    with storage_errors(path):
-        shutil.rmtree(partial, ignore_errors=True)
-        try:
-            for kind in _KINDS:
-                (partial / kind).mkdir(parents=True)
-            yield partial
-            if path.exists():
-                shutil.rmtree(path)
-            partial.rename(path)
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)

@@ -80,6 +80,10 @@ class Effect(ABC):
         """The motion that the grippers really make when told ``motion``; may resample it at ``time_step`` [s]."""
         return motion
 
+    def on_obstacles(self, turn: FloatArray) -> FloatArray:
+        """The turn about the origin, a unit quaternion w x y z ``(4,)``, by which obstacles stand off level."""
+        return turn
+
     def on_loads(self, body: Body, material: Material, loads: FloatArray) -> FloatArray:
         """Extra point mass ``(V,)`` [kg] on the vertices, which weighs too; ``loads`` is what hangs there already."""
         return loads

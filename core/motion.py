@@ -23,6 +23,20 @@ def inverse(quaternion: FloatArray) -> FloatArray:
     return np.asarray(quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
+def multiply(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The turn ``b`` followed by the turn ``a``, unit quaternions w x y z ``(..., 4)``, broadcasting."""
+    v, u = a[..., :1], a[..., 1:]
+    w, x = b[..., :1], b[..., 1:]
+    scalar = v * w - np.sum(u * x, axis=-1, keepdims=True)
+    return np.concatenate([scalar, v * x + w * u + np.cross(u, x)], axis=-1)
+
+
+def turned(quaternion: FloatArray, poses: FloatArray) -> FloatArray:
+    """``poses (..., 7)`` turned as a whole about the origin by ``quaternion (4,)``."""
+    made = [rotate(quaternion, poses[..., :3]), multiply(quaternion, poses[..., 3:])]
+    return np.concatenate(made, axis=-1)
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Poses of G grippers at K times, held before the first and after the last.
@@ -62,10 +76,10 @@ class Motion:
 
     def at(self, times: FloatArray) -> FloatArray:
         """Poses ``(T, G, 7)`` at ``times (T,)`` [s]; positions linear, quaternions along the chord."""
-        turned = self.poses.copy()
+        poses = self.poses.copy()
         # q and -q are the same turn: keep to one side, or the chord goes the long way round
-        flips = np.sum(turned[1:, :, 3:] * turned[:-1, :, 3:], axis=-1) < 0
-        turned[1:, :, 3:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[..., None]
-        out = interpolate(times, self.times, turned)
+        flips = np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=-1) < 0
+        poses[1:, :, 3:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[..., None]
+        out = interpolate(times, self.times, poses)
         out[..., 3:] /= np.linalg.norm(out[..., 3:], axis=-1, keepdims=True)
         return np.asarray(out)

@@ -12,6 +12,7 @@ from .effect import Effect
 from .errors import InputError, RolloutFailed
 from .interpolation import interpolate
 from .material import Material
+from .motion import IDENTITY_POSE, Motion, inverse, rotate, turned
 from .sanity import SanityCheck
 from .scenario import STANDARD_GRAVITY, Scenario
 from .series import PointSeries
@@ -30,7 +31,7 @@ class Trajectory:
 
     Args:
         series: the observed markers.
-        vertices: ``(T, V, 3)`` [m] when they were seen, before what effects make of points.
+        vertices: ``(T, V, 3)`` [m] when they were seen, in the world, before what effects make of points.
         poses: gripper poses really made ``(T, G, 7)`` at the observation times.
         seconds: that the computation took [s].
     """
@@ -76,6 +77,12 @@ def rollout(
         _check_needs(effect, simulator)
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
         scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
+    askew = reduce(lambda turn, effect: effect.on_obstacles(turn), active, IDENTITY_POSE[3:])
+    is_askew = not np.array_equal(askew, IDENTITY_POSE[3:])
+    if is_askew:  # engines know level obstacles only, so all else is turned until they are
+        level = inverse(askew)
+        gravity = rotate(level, gravity)
+        scenario = replace(scenario, motion=Motion(scenario.motion.times, turned(level, scenario.motion.poses)))
     scene = scenario.scene(material, gravity, scale)
     for effect in active:
         scene = replace(scene, loads=effect.on_loads(scene.body, material, scene.loads))
@@ -127,11 +134,13 @@ def rollout(
     finally:
         world.close()
     vertices = interpolate(np.maximum(seen, start), clock[settle_steps:], path)
+    poses = scenario.motion.at(scenario.times)
+    if is_askew:
+        vertices, poses = rotate(askew, vertices), turned(askew, poses)
     points: FloatArray = scenario.markers @ vertices
     for effect in active:
         points = effect.on_points(points)
-    series, poses = PointSeries(scenario.times, points), scenario.motion.at(scenario.times)
-    return Trajectory(series, vertices, poses, time.monotonic() - started)
+    return Trajectory(PointSeries(scenario.times, points), vertices, poses, time.monotonic() - started)
 
 
 def _check_needs(effect: Effect, simulator: Simulator) -> None:

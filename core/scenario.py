@@ -16,9 +16,9 @@ from .obstacles import Obstacle
 from .scene import Scene
 
 STANDARD_GRAVITY = 9.80665
-#: ``(body [world, to scale], poses of the grippers (G, 7), obstacles, clearance [m]) -> start (V, 3) [m], world``.
-#: ``clearance`` is how far from an obstacle's surface a vertex stays. A function of a module, so that it pickles.
-StartShape: TypeAlias = Callable[[Body, FloatArray, tuple[Obstacle, ...], float], FloatArray]
+#: ``(body [world, to scale], poses of the grippers (G, 7), grasps, obstacles, clearance [m]) -> start (V, 3) [m],
+#: world``. ``clearance`` is how far from an obstacle's surface a vertex stays. Of a module, so that it pickles.
+StartShape: TypeAlias = Callable[[Body, FloatArray, tuple[IntArray, ...], tuple[Obstacle, ...], float], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class Scenario:
         if self.start is None:
             return rest
         body = replace(self.body, vertices=rest)
-        return self.start(body, self.motion.at(self.times[:1])[0], self.obstacles, clearance)
+        return self.start(body, self.motion.at(self.times[:1])[0], self.grasps, self.obstacles, clearance)
 
     def scene(self, material: Material, gravity: FloatArray, scale: float = 1.0) -> Scene:
         """What an engine builds: ``material`` in SI, ``gravity (3,)`` [m/s2], ``scale`` of the object's size [1]."""
@@ -114,6 +114,9 @@ class Scenario:
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
         """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].
+
+        They keep the place in their gripper that they have at the start. Where no start shape bends an object between
+        two grippers, the second holds it at where it scales to, not at where the gripper itself is.
 
         Args:
             vertices: world positions at the start ``(V, 3)``, from :meth:`start_vertices`.

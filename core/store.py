@@ -45,14 +45,21 @@ def new_store(path: Path, *, overwrite: bool = False) -> Iterator[zarr.Group]:
         raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
     if path.exists() and not (path / "zarr.json").exists():
         raise InputError(f"{path} exists and is not a Zarr store; it is not replaced")
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    with new_folder(path) as partial:
+        root = zarr.open_group(partial, mode="w", zarr_format=3)
+        root.attrs["muslin_format"] = FORMAT
+        yield root
+
+
+@contextlib.contextmanager
+def new_folder(path: Path) -> Iterator[Path]:
+    """A folder that takes the place of ``path`` when the block ends well, and leaves nothing behind otherwise."""
+    partial = path.absolute().with_name(f".{path.absolute().name}.{os.getpid()}.partial")
     with storage_errors(path):
         shutil.rmtree(partial, ignore_errors=True)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            root = zarr.open_group(partial, mode="w", zarr_format=3)
-            root.attrs["muslin_format"] = FORMAT
-            yield root
+            partial.mkdir(parents=True)
+            yield partial
             if path.exists():
                 shutil.rmtree(path)
             partial.rename(path)

@@ -59,6 +59,14 @@ def test_the_beam_is_imported_and_its_study_resolves(tmp_path: Path) -> None:
         assert np.ptp(recording.series.points[:, :, 2], axis=0).min() > 0.005  # it was let go
 
 
+def test_an_engine_that_is_not_there_is_one_line() -> None:
+    done = subprocess.run(
+        [sys.executable, str(EXAMPLES / "own_mesh/swing.py"), "mujco"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "no simulator 'mujco'" in done.stderr and "Traceback" not in done.stderr
+
+
 @pytest.mark.parametrize("engine", ["mujoco", pytest.param("pybullet", marks=pytest.mark.slow)])
 def test_the_shirt_is_what_its_script_makes_and_swings(
     engine: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -1,7 +1,9 @@
 """From a scene to MJCF, and from MJCF to a model that holds the scene's material."""
 
 import warnings
+from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -84,20 +86,8 @@ def compiled(scene: Scene, time_step: float) -> Model:
             soft, bending = bending, soft
         else:
             sets = quadruples(bending, body.vertices)
-    xml = mjcf(scene, time_step, sets)
-    if body.kind == "cloth" and any(isinstance(o, StaticMesh) for o in scene.obstacles):
-        # MuJoCo holds a triangle on a mesh at one point, its deepest, which goes to and fro between the corners
-        spec = engine().MjSpec.from_string(xml)
-        for i in range(count):
-            size = [_radius(scene), 0.0, 0.0]
-            spec.body(f"body_{i}").add_geom(
-                type=engine().mjtGeom.mjGEOM_SPHERE, size=size, mass=0.0, contype=0, conaffinity=1
-            )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # what the other way of compiling tells the handler of the engine
-            model = spec.compile()
-    else:
-        model = engine().MjModel.from_xml_string(xml)
+    dotted = body.kind == "cloth" and any(isinstance(o, StaticMesh) for o in scene.obstacles)
+    model = copy(_built(mjcf(scene, time_step, sets), count if dotted else 0, _radius(scene)))
     if model.nv < 3 * count:
         raise ValueError(f"it built {model.nv} coordinates for {count} vertices")
     vertex_bodies = model.dof_bodyid[3 * np.arange(count)]  # in order; the twists of a rope come after them
@@ -115,6 +105,26 @@ def compiled(scene: Scene, time_step: float) -> Model:
     turn = frame(body) if quadratic_cells(body) else np.eye(3)
     turned = None if np.array_equal(turn, np.eye(3)) else turn
     return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft)
+
+
+@lru_cache(maxsize=4)
+def _built(xml: str, spheres: int, radius: float) -> Any:
+    """What MuJoCo's compiler makes of ``xml``, to be copied: draws of a study mostly differ in what comes after it.
+
+    MuJoCo holds a triangle on a mesh at one point, its deepest, which goes to and fro between the corners; so there
+    ``spheres`` of ``radius`` [m] are put on the vertices, too.
+    """
+    if not spheres:
+        return engine().MjModel.from_xml_string(xml)
+    spec = engine().MjSpec.from_string(xml)
+    for i in range(spheres):
+        size = [radius, 0.0, 0.0]
+        spec.body(f"body_{i}").add_geom(
+            type=engine().mjtGeom.mjGEOM_SPHERE, size=size, mass=0.0, contype=0, conaffinity=1
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # what the other way of compiling tells the handler of the engine
+        return spec.compile()
 
 
 def mjcf(scene: Scene, time_step: float, sets: IntArray) -> str:
@@ -168,17 +178,19 @@ def _elasticity(scene: Scene, flat: bool) -> str:
 
     The world sets the damping step by step; what is said here decides whether MuJoCo makes room for it.
     """
-    m = scene.material
+    m, damping = scene.material, _room(scene.material.damping_time)
     if isinstance(m, ClothMaterial):
         # all of this is overwritten but which arrays there are: hinges of its own only where the rest shape is curved
         kind = "stretch" if flat else "both"
-        return f'<elasticity young="1" poisson="0" thickness="1" damping="{m.damping_time:.17g}" elastic2d="{kind}"/>'
+        return f'<elasticity young="1" poisson="0" thickness="1" damping="{damping}" elastic2d="{kind}"/>'
     if isinstance(m, RopeMaterial):
-        return f'<elasticity young="1" damping="{m.damping_time:.17g}"/>'
-    return (
-        f'<elasticity young="{m.youngs_modulus:.17g}" poisson="{m.poisson_ratio:.17g}" '
-        f'damping="{m.damping_time:.17g}"/>'
-    )
+        return f'<elasticity young="1" damping="{damping}"/>'
+    return f'<elasticity young="{m.youngs_modulus:.17g}" poisson="{m.poisson_ratio:.17g}" damping="{damping}"/>'
+
+
+def _room(damping_time: float) -> int:
+    """The damping to compile with: the same for all that have some, so that they are compiled once."""
+    return int(damping_time > 0)
 
 
 def _second_flex(body: Body, damping_time: float, sets: IntArray) -> str:
@@ -197,7 +209,7 @@ def _second_flex(body: Body, damping_time: float, sets: IntArray) -> str:
     return f"""<flex name="second" dim="2" radius="{RADIUS}" body="{" ".join(names)}"
         element="{" ".join(str(i) for i in triangles.ravel())}">
       <contact selfcollide="none" contype="0" conaffinity="0"/>
-      <elasticity young="1" poisson="0" thickness="1" damping="{damping_time:.17g}" elastic2d="{kind}"/>
+      <elasticity young="1" poisson="0" thickness="1" damping="{_room(damping_time)}" elastic2d="{kind}"/>
     </flex>"""
 
 

@@ -10,6 +10,7 @@ from matplotlib.collections import LineCollection
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.comparison import SimulatorComparison, SimulatorRun
+from ...core.comparison.result import told
 from ...core.store import write_text
 from .figures_object import Snapshot, best_view
 from .style import AFTER, BEFORE, INK, RULE, SCATTER, SOFT, bare, data_uri, look, new_figure, png, svg
@@ -29,6 +30,7 @@ def write_simulator_report(found: SimulatorComparison, edges: IntArray, path: Pa
     environment = Environment(
         loader=PackageLoader("muslin.cli"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    environment.filters["told"] = told
     write_text(path, environment.get_template("simulators.html.j2").render(_context(found, edges)))
     return path
 
@@ -40,6 +42,7 @@ def _context(found: SimulatorComparison, edges: IntArray) -> dict[str, Any]:
         "pairs": [_pair(found, a, b, edges, i) for i, (a, b) in enumerate(found.pairs)],
         "sensitivity": _sensitivity_figure(found),
         "parameters": list(found.space),
+        "too_few": found.too_few,
         "colours": dict(zip([r.name for r in found.runs], COLOURS, strict=False)),
     }
 
@@ -53,10 +56,8 @@ def _pair(
     shots = []
     if len(both):
         ranked = both[np.argsort(size[both])]
-        for title, draw in (
-            ("the median draw", ranked[len(ranked) // 2]),
-            ("the draw they disagree on most", ranked[-1]),
-        ):
+        chosen = {"the median draw": ranked[(len(ranked) - 1) // 2], "the draw they disagree on most": ranked[-1]}
+        for title, draw in chosen.items() if len(ranked) > 1 else [("the only draw", ranked[0])]:
             shots.append(
                 {"title": title, "drawn": _values(found, draw), **_shot(found, one, other, draw, apart, edges)}
             )
@@ -108,6 +109,9 @@ def _region_figure(found: SimulatorComparison, size: FloatArray, i: int) -> str:
 
 
 def _sensitivity_figure(found: SimulatorComparison) -> str:
+    """Nothing where it cannot be told for any simulator."""
+    if not any(np.isfinite(r.sensitivity(found.unit_draws)[0]).any() for r in found.runs):
+        return ""
     with look("sensitivity"):
         figure = new_figure(5.4, 0.55 + 0.5 * len(found.space))
         axes = figure.add_subplot()

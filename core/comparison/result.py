@@ -10,6 +10,9 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray
 from ..parameters import ParameterSpace
 
+#: Stands for what cannot be told.
+UNKNOWN = "\u2013"
+
 
 @dataclass(frozen=True, eq=False)
 class SimulatorRun:
@@ -137,35 +140,48 @@ class SimulatorComparison:
             ],
         }
 
+    @property
+    def too_few(self) -> str:
+        """What to say where sensitivities cannot be told for want of draws; otherwise nothing."""
+        if all(np.isfinite(r.sensitivity(self.unit_draws)[0]).all() for r in self.runs):
+            return ""
+        return f"too few draws ended well to tell; {4 * (len(self.space) + 1)} or more would do"
+
     def text(self) -> str:
         """The result in lines for a terminal."""
         lines = [f"{self.scenario}: {len(self.unit_draws)} draws of {', '.join(self.space.names)}", ""]
         for r in self.runs:
             failed = f"{len(r.failures)} failed" if r.failures else "none failed"
-            lines.append(f"  {r.name:10s} {_median(r.seconds):.2f} s a rollout, {failed} ({r.engine})")
+            lines.append(f"  {r.name:10s} {told(_median(r.seconds), 2)} s a rollout, {failed} ({r.engine})")
             lines += [f"             failed: {reason}" for reason in sorted(set(r.failures.values()))[:3]]
         lines += ["", "how far a vertex moves when the parameter crosses its prior [mm]"]
         lines.append("  " + " " * 20 + "".join(f"{r.name:>12s}" for r in self.runs))
         moves = [r.sensitivity(self.unit_draws)[0] for r in self.runs]
         for p, name in enumerate(self.space.names):
-            lines.append(f"  {name:20s}" + "".join(f"{1000 * m[p]:12.1f}" for m in moves))
+            lines.append(f"  {name:20s}" + "".join(f"{told(1000 * m[p]):>12s}" for m in moves))
         for a, b in self.pairs:
             size = _median(np.sqrt(np.mean(self.difference(a, b) ** 2, axis=1)))
+            spread = f"{told(1000 * self.spread(a))} and {told(1000 * self.spread(b))}"
             lines += [
                 "",
-                f"{a.name} and {b.name} are {1000 * size:.1f} mm apart (median draw, RMS over vertices, time);",
+                f"{a.name} and {b.name} are {told(1000 * size)} mm apart (median draw, RMS over vertices, time); "
+                f"draws spread by {spread} mm",
             ]
-            lines[-1] += f" draws spread by {1000 * self.spread(a):.1f} and {1000 * self.spread(b):.1f} mm"
             regions, cosines = self.by_region(a, b), self.alike(a, b)
             for p, name in enumerate(self.space.names):
-                low, middle, high = (1000 * x for x in regions[p])
+                low, middle, high = (told(1000 * x) for x in regions[p])
                 lines.append(
-                    f"  {name:20s} low {low:.1f}, middle {middle:.1f}, high {high:.1f} mm apart; "
-                    f"what it does has cosine {cosines[p]:.2f}"
+                    f"  {name:20s} low {low}, middle {middle}, high {high} mm apart; "
+                    f"what it does has cosine {told(cosines[p], 2)}"
                 )
-        if not all(np.isfinite(m).all() for m in moves):
-            lines += ["", f"nan: too few draws ended well to tell; {4 * (len(self.space) + 1)} or more would do"]
+        if self.too_few:
+            lines += ["", f"{UNKNOWN}: {self.too_few}"]
         return "\n".join(lines)
+
+
+def told(value: float, digits: int = 1) -> str:
+    """A number for people."""
+    return f"{value:.{digits}f}" if np.isfinite(value) else UNKNOWN
 
 
 def _median(values: FloatArray) -> float:

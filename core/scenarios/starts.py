@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..body import Body
 from ..errors import InputError
 from ..motion import rotate
@@ -25,14 +25,25 @@ class GivenShape:
     measure: float
     about: FloatArray
 
-    def __call__(self, body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clearance: float) -> FloatArray:
+    def __call__(
+        self,
+        body: Body,
+        poses: FloatArray,
+        grasps: tuple[IntArray, ...],
+        obstacles: tuple[Obstacle, ...],
+        clearance: float,
+    ) -> FloatArray:
         scale = float(body.measures.sum()) / self.measure
         local = self.about + scale * (self.vertices - self.about)
         return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 
-def sagging(body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clearance: float) -> FloatArray:
+def sagging(
+    body: Body, poses: FloatArray, grasps: tuple[IntArray, ...], obstacles: tuple[Obstacle, ...], clearance: float
+) -> FloatArray:
     """A rope that hangs from the first gripper to the second, at rest under its weight but for bending.
+
+    What of it is beyond a gripper hangs straight down.
 
     Raises:
         InputError: there is no second gripper.
@@ -43,11 +54,24 @@ def sagging(body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clea
             f"{len(poses)}; a rope with one end free is scenario 'swing' or 'hang', or another that takes a rope"
         )
     count = len(body.vertices)
-    return hanging_chain(poses[0, :3], poses[1, :3], count, float(body.measures.sum()) / (count - 1))
+    link = float(body.measures.sum()) / (count - 1)
+    first, last = 0, count - 1
+    if len(grasps) > 1:
+        rising = grasps[0].mean() <= grasps[1].mean()
+        first, last = (int(g.min() if low else g.max()) for g, low in zip(grasps, (rising, not rising), strict=False))
+    start = hanging_chain(poses[0, :3], poses[1, :3], abs(last - first) + 1, link)
+    start = start if first <= last else start[::-1]
+    before = min(first, last)
+    after = count - before - len(start)
+    return np.concatenate([_down(start[0], before, link)[::-1], start, _down(start[-1], after, link)])
 
 
-def draped(body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clearance: float) -> FloatArray:
+def draped(
+    body: Body, poses: FloatArray, grasps: tuple[IntArray, ...], obstacles: tuple[Obstacle, ...], clearance: float
+) -> FloatArray:
     """A rope from the first gripper straight to a lying cylinder, over its top and down on the other side.
+
+    That is the longer end of it; what is beyond the gripper hangs straight down.
 
     Raises:
         InputError: there is no such cylinder, or the gripper is in it or beside it.
@@ -77,7 +101,17 @@ def draped(body: Body, poses: FloatArray, obstacles: tuple[Obstacle, ...], clear
     flat = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     flat = np.concatenate([[[p, q]], flat, [flat[-1] - [0.0, float(body.measures.sum())]]])
     curve = spool.center + along * spool.direction + flat[:, :1] * out + flat[:, 1:] * up
-    return chain_along(curve, len(body.vertices), link)
+    count = len(body.vertices)
+    backward = bool(grasps) and float(grasps[0].mean()) > (count - 1) / 2
+    beyond = 0 if not grasps else int(count - 1 - grasps[0].max() if backward else grasps[0].min())
+    over = chain_along(curve, count - beyond, link)
+    start = np.concatenate([_down(over[0], beyond, link)[::-1], over])
+    return start[::-1] if backward else start
+
+
+def _down(point: FloatArray, count: int, link: float) -> FloatArray:
+    """Vertices ``(count, 3)`` below ``point (3,)``, each ``link`` [m] from the last."""
+    return np.asarray(point - link * np.outer(np.arange(1, count + 1), [0.0, 0.0, 1.0]))
 
 
 def chain_along(curve: FloatArray, count: int, link: float) -> FloatArray:

@@ -46,6 +46,7 @@ def check_hooks(effect: type[Effect], kind: str) -> None:
     loads = np.full(len(body.vertices), 1e-3)
     arrays: list[tuple[str, Callable[[FloatArray], FloatArray], FloatArray]] = [
         ("on_gravity", one.on_gravity, np.array([0.0, 0.0, -STANDARD_GRAVITY])),
+        ("on_obstacles", one.on_obstacles, np.array([0.8, 0.0, 0.0, 0.6])),
         ("on_loads", lambda a: one.on_loads(body, material, a), loads),
         ("on_clock", one.on_clock, times),
         ("on_points", one.on_points, points),
@@ -54,6 +55,8 @@ def check_hooks(effect: type[Effect], kind: str) -> None:
         got = _returned(name, hook, given)
         must(got.shape == given.shape, f"{name} gives shape {got.shape} for {given.shape}")
         must(np.isfinite(got).all(), f"{name} gives a number that is not finite")
+    size = float(np.linalg.norm(one.on_obstacles(np.array([0.8, 0.0, 0.0, 0.6]))))
+    must(abs(size - 1.0) < 1e-9, f"on_obstacles gives a quaternion of length {size:.3g}, not 1")
     must((one.on_loads(body, material, loads) >= 0).all(), "on_loads gives a negative mass")
     must((np.diff(one.on_clock(times)) >= 0).all(), "on_clock makes later frames be seen earlier")
     seen = points.copy()
@@ -125,7 +128,7 @@ def check_dissipative(effect: type[Effect], kind: str) -> None:
     other hook has a part in it.
     """
     one = effect(**strongest(effect))
-    for hook in ("on_gravity", "on_command", "on_loads", "bind_grasp"):
+    for hook in ("on_gravity", "on_obstacles", "on_command", "on_loads", "bind_grasp"):
         own = getattr(effect, hook) is not getattr(Effect, hook)
         must(not own, f"it is dissipative, but acts through {hook}, which can add energy")
     material = sample_material(kind)

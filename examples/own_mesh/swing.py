@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from muslin.core.errors import MuslinError
 from muslin.core.importing.mesh import read_body
 from muslin.core.material import ClothMaterial
 from muslin.core.measurement import Measurement, Recording
@@ -31,8 +32,9 @@ def main(engine: str, output: str | None = None) -> None:
         grasps=grasps_at(shirt, [SHOULDERS], radius=0.05),
         markers=np.eye(len(shirt.vertices)),
     )
+    simulator = REGISTRY.get("simulator", engine)()
     began = time.perf_counter()
-    seen = rollout(REGISTRY.get("simulator", engine)(), scenario, ClothMaterial(areal_density=0.18))
+    seen = rollout(simulator, scenario, ClothMaterial(areal_density=0.18))
     hem = np.flatnonzero(shirt.vertices[:, 2] < shirt.vertices[:, 2].min() + 1e-9)
     reach = np.ptp(seen.vertices[:, hem].mean(axis=1), axis=0)
     print(
@@ -44,4 +46,7 @@ def main(engine: str, output: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:3]) if len(sys.argv) > 1 else print(__doc__)
+    try:
+        main(*sys.argv[1:3]) if len(sys.argv) > 1 else print(__doc__)
+    except MuslinError as error:
+        sys.exit(f"error: {error}")

@@ -10,32 +10,42 @@ AIR_DENSITY = 1.204
 
 
 class Surface:
-    """The triangles of a body, with what is needed to act on them every step."""
+    """The triangles of a body, with what is needed to act on them every step.
+
+    Corners are gathered a coordinate at a time, which keeps the loops of NumPy as long as there are triangles.
+    """
 
     def __init__(self, body: Body) -> None:
-        self._triangles = body.triangles
-        self._a, self._b, self._c = body.triangles.T
-        self._count = len(body.vertices)
+        corners = 3 * body.triangles.T[:, None, :]
+        self._slots = corners + np.arange(3)[:, None]  # (3 corners, 3 coordinates, F)
+        self._cyclic = corners + np.array([0, 1, 2, 0, 1])[:, None]
+        self._flat = self._slots.ravel()
+        self._size = 3 * len(body.vertices)
         # Air touches both sides of a sheet, which one orientation of each triangle stands for.
         self.closed = body.kind == "solid"
 
     def area_vectors(self, positions: FloatArray) -> FloatArray:
         """Area times unit normal ``(F, 3)`` [m2]."""
-        a = positions[self._a]
-        return np.asarray(0.5 * np.cross(positions[self._b] - a, positions[self._c] - a))
+        a, b, c = positions.ravel().take(self._cyclic)
+        one, two = b - a, c - a
+        normal = one[1:4] * two[2:5]
+        normal -= one[2:5] * two[1:4]
+        normal *= 0.5
+        return np.asarray(normal.T)
 
     def mean(self, values: FloatArray) -> FloatArray:
         """Mean over the corners ``(F, 3)`` of vertex values ``(V, 3)``."""
-        return np.asarray((values[self._a] + values[self._b] + values[self._c]) / 3.0)
+        a, b, c = values.ravel().take(self._slots)
+        a += b
+        a += c
+        a /= 3.0
+        return np.asarray(a.T)
 
     def to_vertices(self, forces: FloatArray) -> FloatArray:
         """A third of each triangle force ``(F, 3)`` to each of its corners: ``(V, 3)``."""
-        out = np.empty((self._count, 3))
-        third = np.repeat(forces / 3.0, 3, axis=0)
-        index = self._triangles.ravel()
-        for axis in range(3):
-            out[:, axis] = np.bincount(index, third[:, axis], minlength=self._count)
-        return out
+        thirds = np.broadcast_to(forces.T / 3.0, self._slots.shape)
+        sums: FloatArray = np.bincount(self._flat, thirds.ravel(), self._size).astype(np.float64)
+        return sums.reshape(-1, 3)
 
 
 def plate_force(area_vectors: FloatArray, relative: FloatArray, drag: float, lift: float, closed: bool) -> FloatArray:
@@ -52,13 +62,14 @@ def plate_force(area_vectors: FloatArray, relative: FloatArray, drag: float, lif
     the lift jumps from one sign to the other, as the law has it. Broadside (v_r parallel to n) the
     force is 1/2 rho A C_D |v_r|^2.
     """
-    area = np.linalg.norm(area_vectors, axis=1, keepdims=True)
-    normal = area_vectors / np.maximum(area, 1e-300)
-    along = np.einsum("fi,fi->f", relative, normal)[:, None]
+    # With S = A n for either n, all that is asked of the leading side is |v_r . S| and the sign of S.
+    through = np.einsum("fi,fi->f", relative, area_vectors)
     if closed:
-        area = np.where(along > 0, area, 0.0)
-    else:
-        normal = np.where(along < 0, -normal, normal)
-        along = np.abs(along)
-    speed2 = np.einsum("fi,fi->f", relative, relative)[:, None]
-    return np.asarray(-0.5 * AIR_DENSITY * area * ((drag - lift) * along * relative + lift * speed2 * normal))
+        through = np.maximum(through, 0.0)
+    out = ((drag - lift) * np.abs(through))[:, None] * relative
+    if lift != 0.0:
+        lifted = lift * np.einsum("fi,fi->f", relative, relative)
+        side = np.sign(through) if closed else np.copysign(1.0, through)
+        out += (lifted * side)[:, None] * area_vectors
+    out *= -0.5 * AIR_DENSITY
+    return np.asarray(out)

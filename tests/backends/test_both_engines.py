@@ -123,7 +123,7 @@ def test_a_hanging_rope_swings_as_a_heavy_chain(engine, length):
     assert periods.mean() == pytest.approx(period, rel=0.01)
 
 
-def bent(body, poses, obstacles, clearance, mode):
+def bent(body, poses, grasps, obstacles, clearance, mode):
     """A rope in its world place, moved along y by ``mode (V,)`` [m]."""
     return body.vertices + np.outer(mode, [0.0, 1.0, 0.0])
 

@@ -1,10 +1,18 @@
 """``muslin compare-simulators``."""
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from running import Muslin
+
+from muslin.core.comparison import compare_simulators
+from muslin.core.parameters import Parameter
+from muslin.core.scenarios import preset
+from muslin.core.testing.reference import ReferenceSimulator
 
 
 @pytest.mark.slow
@@ -23,6 +31,26 @@ def test_one_command_writes_report_and_figures(muslin: Muslin, tmp_path: Path) -
     assert page.count("<svg") >= 3 and page.count("data:image/png") == 2
     assert "built-in method" not in page and page.count("stretch_stiffness 1") == 2  # the values of both draws shown
     assert "http" not in page.replace("http://www.w3.org", "")
+
+
+@pytest.mark.parametrize(("draws", "shots"), [(1, ["The only draw"]), (2, ["The median draw", "disagree on most"])])
+def test_a_page_about_few_draws_shows_each_once_and_no_number_that_is_none(
+    draws: int, shots: list[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("jinja2")
+    from muslin.cli.report.simulators import write_simulator_report
+
+    class Twin(ReferenceSimulator):
+        name: ClassVar[str] = "twin"
+
+    scenario = preset("hang").scenario(vertices=(3, 3))
+    scenario = replace(scenario, times=scenario.times[:4])
+    prior = [Parameter("stretch_stiffness", "N/m", 10.0, 40.0)]
+    found = compare_simulators(scenario, [ReferenceSimulator(), Twin()], draws, parameters=prior, workers=0)
+    page = write_simulator_report(found, scenario.body.edges, tmp_path / "page.html").read_text()
+    assert "nan" not in re.sub(r"<style>.*?</style>|data:[^\"]*", "", page, flags=re.S)
+    assert page.count("data:image/png") == len(shots) and all(s in page for s in shots)
+    assert "too few draws ended well to tell; 8 or more would do" in page
 
 
 @pytest.mark.parametrize(

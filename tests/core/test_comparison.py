@@ -88,6 +88,16 @@ def test_failed_draws_are_counted_with_their_reason_and_left_out(hanging):
     assert "too stiff for me" in found.text()
 
 
+@pytest.mark.parametrize("draws", [1, 2])
+def test_what_few_draws_cannot_tell_is_said_and_not_printed_as_a_number(hanging, draws):
+    found = compare_simulators(
+        hanging, [ReferenceSimulator(), Softer()], draws, parameters=[STIFFNESS, DENSITY], workers=0
+    )
+    assert "nan" not in found.text()
+    assert "\u2013: too few draws ended well to tell; 12 or more would do" in found.text()
+    assert "0.0 mm apart (median" not in found.text()  # what can be told is told
+
+
 def test_draws_are_the_same_every_time_and_fill_the_prior(hanging):
     first, again = (run(hanging, ReferenceSimulator(), Softer(), seed=3).unit_draws for _ in range(2))
     np.testing.assert_array_equal(first, again)

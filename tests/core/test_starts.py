@@ -94,6 +94,29 @@ def test_a_cable_leaves_a_gripper_along_its_turn() -> None:
     np.testing.assert_allclose(after, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ before, atol=1e-12)
 
 
+@pytest.mark.parametrize("ends", [((20, 19), (1, 0)), ((3,), (15,)), ((15,), (3,)), ((20,), (5, 4))])
+def test_a_cable_is_held_by_the_vertices_that_its_grippers_hold(ends: tuple[tuple[int, ...], tuple[int, ...]]) -> None:
+    """Whichever end is in the first gripper, and wherever along it they are; what is beyond hangs down."""
+    scenario = preset("cable").scenario(size=[0.8], vertices=[21])
+    poses = np.array([[[0.2, 0.1, 0.5, 1, 0, 0, 0], [0.4, -0.1, 0.6, 1, 0, 0, 0]]])
+    scenario = replace(scenario, motion=Motion(np.zeros(1), poses), grasps=tuple(np.array(e) for e in ends))
+    start = scenario.start_vertices()
+    low, high = sorted((ends[0][0], min(ends[1]) if ends[1][0] < ends[0][0] else max(ends[1])))
+    np.testing.assert_allclose(start[[ends[0][0], low + high - ends[0][0]]], poses[0, :, :3], atol=1e-12)
+    np.testing.assert_allclose(links(start), 0.04, rtol=1e-9)
+    for tail in (start[: low + 1], start[high:]):
+        assert not np.ptp(tail[:, :2], axis=0).any()
+
+
+@pytest.mark.parametrize(("grasp", "at"), [((50, 49), 50), ((5, 6), 5), ((44,), 44)])
+def test_a_rope_is_wound_from_where_it_is_held(grasp: tuple[int, ...], at: int) -> None:
+    scenario = replace(preset("winding").scenario(), grasps=(np.array(grasp),))
+    start = scenario.start_vertices()
+    np.testing.assert_allclose(start[at], scenario.motion.poses[0, 0, :3], atol=1e-12)
+    np.testing.assert_allclose(links(start), 0.02, rtol=1e-9)
+    assert start[0 if at > 25 else -1, 0] < -0.04  # the longer end hangs on the other side
+
+
 @pytest.mark.parametrize("diameter", [0.002, 0.02])
 def test_a_wound_rope_starts_on_the_spool(diameter: float) -> None:
     scenario = preset("winding").scenario()

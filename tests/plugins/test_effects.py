@@ -45,7 +45,7 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "rope-hysteresis": ("force", "bind", "rope", {"friction_moment": "N m"}),
     "stick-slip": ("contact", "bind", ALL, {"excess": "1"}),
     "strain-stiffening": ("material", "bind_stiffness", "cloth rope", {"stiffening": "1"}),
-    "table-tilt": ("contact", "on_command on_gravity on_points", ALL, {"about_x": "rad", "about_y": "rad"}),
+    "table-tilt": ("contact", "on_obstacles", ALL, {"about_x": "rad", "about_y": "rad"}),
     "twist-stiffness": ("material", "on_material", "rope", {"twist_rigidity": "N m2"}),
     "viscous-damping": ("force", "bind", ALL, {"rate": "1/s"}),
     "wet-patch": ("mass", "on_loads", "cloth rope", {"uptake": "1", "extent": "1"}),

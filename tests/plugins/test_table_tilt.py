@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from muslin.core.body import Body, cloth_grid
 from muslin.core.material import ClothMaterial
-from muslin.core.motion import Motion, rotate
+from muslin.core.motion import IDENTITY_POSE, Motion, rotate
 from muslin.core.obstacles import Table
 from muslin.core.rollout import rollout
 from muslin.core.scenario import Scenario
-from muslin.plugins.effects.observation import rotation_matrix
+from muslin.plugins.effects.observation import CameraRotation, rotation_matrix
 from muslin.plugins.effects.table import TableTilt
 
 GRID = cloth_grid(0.1, 0.1, 3, 3)
@@ -29,9 +29,12 @@ def task(motion, times, grasps=(), obstacles=()):
 TABLE = (Table(0.0),)
 
 
-def points(*effects, name="reference", motion=None, times=(0.0, 0.2), grasps=(), obstacles=TABLE, material=ICE):
-    done = rollout(engine(name), task(motion or Motion.still(), times, grasps, obstacles), material, effects)
-    return done.series.points
+def done(*effects, name="reference", motion=None, times=(0.0, 0.2), grasps=(), obstacles=TABLE, material=ICE):
+    return rollout(engine(name), task(motion or Motion.still(), times, grasps, obstacles), material, effects)
+
+
+def points(*effects, **more):
+    return done(*effects, **more).series.points
 
 
 @pytest.mark.parametrize("name", ["reference", "mujoco"])
@@ -64,15 +67,22 @@ def test_a_hand_that_moves_level_meets_the_table_where_it_rises():
     assert np.median(height) < 1e-3
 
 
+def test_mesh_and_grippers_are_told_in_the_world_too():
+    """Every vertex is a marker, so mesh and points are the same; the hand is where it was told to be."""
+    path = Motion.from_positions(np.array([0.0, 0.2]), np.array([[0.0, 0, 0.004], [-0.15, 0.1, 0.004]])[:, None])
+    told = done(TableTilt(about_x=-0.02, about_y=0.03), motion=path, times=(0.0, 0.1, 0.2), grasps=(np.array([0]),))
+    np.testing.assert_allclose(told.vertices, told.series.points, atol=1e-15)
+    np.testing.assert_allclose(told.poses, path.at(np.array([0.0, 0.1, 0.2])), atol=1e-12)
+    np.testing.assert_allclose(told.vertices[:, 0], FLAT.vertices[0] + told.poses[:, 0, :3], atol=1e-9)
+
+
+def test_a_camera_that_is_off_sees_the_same_whichever_comes_first():
+    effects = [TableTilt(about_x=0.03), CameraRotation(about_z=0.02)]
+    np.testing.assert_array_equal(points(*effects), points(*effects[::-1]))
+
+
 @cases
 @given(st.floats(-0.035, 0.035), st.floats(-0.035, 0.035))
-def test_the_hand_and_gravity_are_turned_back_by_what_points_are_turned_forth(a, b):
-    effect = TableTilt(about_x=a, about_y=b)
-    turn = rotation_matrix(np.array([a, b, 0.0]))
-    np.testing.assert_allclose(turn @ effect.on_gravity(np.array([0, 0, -G])), [0, 0, -G], atol=1e-12)
-    poses = np.array([[[0.3, -0.1, 0.5, 0.8, 0.0, 0.6, 0.0]]])
-    told = Motion(np.zeros(1), poses)
-    made = effect.on_command(told, 0.005).poses[0, 0]
-    np.testing.assert_allclose(effect.on_points(made[None, None, :3])[0, 0], poses[0, 0, :3], atol=1e-12)
-    arm = np.array([[0.1, 0.2, 0.3]])
-    np.testing.assert_allclose(rotate(made[3:], arm) @ turn.T, rotate(poses[0, 0, 3:], arm), atol=1e-12)
+def test_the_tilt_is_a_turn_by_that_rotation_vector(a, b):
+    quaternion = TableTilt(about_x=a, about_y=b).on_obstacles(IDENTITY_POSE[3:])
+    np.testing.assert_allclose(rotate(quaternion, np.eye(3)), rotation_matrix(np.array([a, b, 0.0])).T, atol=1e-12)
