@@ -9,9 +9,18 @@
 """
 
 from .effects import check_effect
+from .estimators import check_estimator
 from .extractors import check_extractor
 from .kits import KITS, run_checks
 from .renderers import check_renderer
 from .simulators import check_simulator
 
-__all__ = ["KITS", "check_effect", "check_extractor", "check_renderer", "check_simulator", "run_checks"]
+__all__ = [
+    "KITS",
+    "check_effect",
+    "check_estimator",
+    "check_extractor",
+    "check_renderer",
+    "check_simulator",
+    "run_checks",
+]

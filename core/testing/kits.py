@@ -1,21 +1,14 @@
 """The kits by kind of plugin, as ``muslin check`` runs them."""
 
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from typing import Any
 
 from .checks import Check, run_all
 from .effects import effect_checks
+from .estimators import installed_estimator_checks
 from .extractors import extractor_checks
 from .renderers import renderer_checks
 from .simulators import simulator_checks
-
-
-def _estimator_checks(estimator: Any) -> list[Check]:
-    from .estimators import check_estimator
-
-    return [Check("keeps what an estimator promises", lambda: check_estimator(estimator))]
-
 
 #: Kind -> the checks of one plugin of that kind.
 KITS: dict[str, Callable[[Any], list[Check]]] = {
@@ -23,9 +16,8 @@ KITS: dict[str, Callable[[Any], list[Check]]] = {
     "extractor": extractor_checks,
     "effect": effect_checks,
     "renderer": renderer_checks,
+    "estimator": installed_estimator_checks,
 }
-if find_spec("muslin.core.testing.estimators") is not None:
-    KITS["estimator"] = _estimator_checks
 
 
 def run_checks(kind: str, plugin: Any) -> Iterator[tuple[str, str | None]]:

@@ -1,171 +1,133 @@
-"""Each check of the kit passes on an exact estimator and fails on one broken in just that way."""
+"""The kit of estimators passes what is right and fails, with a sentence, what is broken in one way."""
 
-from collections.abc import Callable
-from pathlib import Path
+from functools import partial
 
-import numpy as np
+import faulty_estimators as faulty
 import pytest
+from faulty_estimators import Wrong
+from right_estimator import Right
 
-from muslin.core.arrays import FloatArray
-from muslin.core.errors import InputError
-from muslin.core.estimator import Posterior, PosteriorEstimator
-from muslin.core.testing import estimators as kit
+from muslin.core.testing import KITS, check_estimator
+from muslin.core.testing.checks import run_all
+from muslin.core.testing.estimators import estimator_checks
 
-CASE = kit.LinearGaussian.make()
-
-
-class GridPosterior(Posterior):
-    """A density that is constant on the cells of a 200 x 200 grid: all answers exact, numpy alone."""
-
-    size = 200
-    dim = 2
-
-    def __init__(self, mass: FloatArray) -> None:
-        self.mass = mass / mass.sum()
-
-    def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
-        cells = rng.choice(self.mass.size, size=count, p=self.mass.ravel())
-        corner = np.stack(np.unravel_index(cells, self.mass.shape), axis=1)
-        return np.asarray((corner + rng.random((count, 2))) / self.size)
-
-    def log_prob(self, unit: FloatArray) -> FloatArray:
-        cell = np.clip((unit * self.size).astype(int), 0, self.size - 1)
-        inside = ((unit >= 0) & (unit <= 1)).all(axis=1)
-        density = np.log(self.mass[cell[:, 0], cell[:, 1]] * self.size**2 + 1e-300)
-        return np.where(inside, density, -np.inf)
-
-    def save(self, path: Path) -> None:
-        with path.open("wb") as file:
-            np.savez(file, mass=self.mass)
-
-    @classmethod
-    def load(cls, path: Path) -> "GridPosterior":
-        with np.load(path) as data:
-            posterior = cls.__new__(cls)
-            posterior.mass = data["mass"]
-            return posterior
-
-
-class Exact(PosteriorEstimator):
-    """Knows the kit's case; uses the draws only to see whether they say anything."""
-
-    name = "exact"
-    spread = 1.0
-    wrapper: type[GridPosterior] = GridPosterior
-
-    def fit(
-        self, theta: FloatArray, x: list[FloatArray], *, log_weights: FloatArray | None = None, seed: int = 0
-    ) -> None:
-        if len(theta) < 10 or np.isnan(x[0]).all(axis=(1, 2, 3)).any():
-            raise InputError("too few draws, or failed ones")
-        self.told = bool(np.nanmax(np.abs(x[0] - x[0][:1])) > 0)
-
-    def _estimate(self, x: FloatArray) -> FloatArray:
-        seen = np.isfinite((x - CASE.rest).ravel())
-        return np.linalg.lstsq(CASE.jacobian[seen], (x - CASE.rest).ravel()[seen], rcond=None)[0]
-
-    def posterior(self, x: list[FloatArray]) -> Posterior:
-        axis = (np.arange(200) + 0.5) / 200
-        grid = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1) - self._estimate(x[0])
-        chi = np.einsum("abi,ij,abj->ab", grid, np.linalg.inv(CASE.covariance), grid) / self.spread**2
-        return self.wrapper(np.exp(-0.5 * (chi - chi.min()) * self.told) + 1e-12)
-
-
-class LeakingPosterior(GridPosterior):
-    def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
-        return super().sample(count, rng) * 1.2 - 0.1 + 0.4
-
-
-class UnnormalisedPosterior(GridPosterior):
-    def log_prob(self, unit: FloatArray) -> FloatArray:
-        return super().log_prob(unit) + 0.1
-
-
-class ForgetfulPosterior(GridPosterior):
-    @classmethod
-    def load(cls, path: Path) -> "GridPosterior":
-        return GridPosterior(np.float32(np.load(path)["mass"]).astype(float))
+#: Title of a check -> faulty estimators, each with words of the complaint.
+FAULTS: dict[str, dict[type[Right], str]] = {
+    "samples and density have their shapes and support": {
+        Wrong.of(faulty.Leaking): "lie outside the unit cube",
+        Wrong.of(faulty.Boundless): "log_prob outside the unit cube is",
+    },
+    "the density integrates to one": {Wrong.of(faulty.Unnormalised): "integrates to 1.1"},
+    "samples follow the density": {
+        Wrong.of(faulty.Tempered): "times as wide as log_prob says",
+        Wrong.of(faulty.Elsewhere): "standard deviations off the mean of log_prob",
+        Wrong.of(faulty.Repeating): "of 10000 samples repeat others",
+    },
+    "10 000 samples in a second": {Wrong.of(faulty.Slow): "processor seconds, more than 1"},
+    "a saved posterior comes back to the bit": {
+        Wrong.of(faulty.Forgetful): "changed between save and load",
+        Wrong.of(faulty.Pickled): "'mass' of the saved file holds a pickle",
+        Wrong.of(faulty.Renamed): "under the name that was given",
+    },
+    "repeats bit for bit": {
+        faulty.Unseeded: "same draws and seed differ",
+        faulty.Warm: "depends on what was fitted before",
+    },
+    "global random state untouched": {
+        faulty.GlobalNumpy: "numpy's global random state",
+        faulty.GlobalPython: "the random module's global state",
+    },
+    "leaves what it is given as it is": {
+        faulty.WritesDraws: "the caller's theta was written to",
+        faulty.WritesMeasurement: "the caller's the measurement was written to",
+    },
+    "says so when asked before fit": {
+        faulty.Eager: "it gives a posterior before fit",
+        faulty.Absent: "TypeError instead of StepMissingError",
+    },
+    "refuses too few draws": {
+        faulty.Careless: "three draws are accepted",
+        faulty.Strict: "RuntimeError instead of InputError",
+    },
+    "refuses failed draws": {
+        faulty.Careless: "all-NaN draws are accepted",
+        faulty.Strict: "RuntimeError instead of InputError",
+    },
+    "draws that tell nothing give the prior": {faulty.Certain: "the prior has 0.289"},
+    "reads points that are missing": {faulty.Brittle: "NaN"},
+    "reads every recording": {
+        faulty.OneRecording: "one that reads only one of them",
+        faulty.AnyRecordings: "too few recordings in a measurement are accepted",
+    },
+    "honours importance weights": {faulty.Weightless: "towards where the draws are"},
+    "stays proper at the prior's bounds": {
+        Wrong.of(faulty.Clipped): "as if they were clipped",
+        Wrong.of(faulty.Uncut): "integrates to 0.",
+        faulty.Shy: "in a corner of the prior",
+    },
+    "recovers a known posterior": {
+        faulty.Shifted: "exact standard deviations off",
+        faulty.Overconfident: "times the exact ones",
+    },
+    "is as often right as it says": {faulty.Overconfident: "80 % intervals hold the truth in"},
+}
+SET_FAULTS: dict[str, dict[type[Right], str]] = {
+    "the order of points has no influence": {
+        faulty.Ordered: "permuting the points of the measurement",
+        faulty.OrderedTraining: "permuting the points of the training draws",
+    },
+    "reads sets of every size": {faulty.FixedSize: "is refused"},
+    "knows that more points tell more": {faulty.Sizeless: "for sets of 32 points"},
+}
 
 
-class Shifted(Exact):
-    def _estimate(self, x: FloatArray) -> FloatArray:
-        return super()._estimate(x) + 0.06
+def complaint(estimator: type[Right], title: str, ordered: bool) -> str | None:
+    checks = estimator_checks(partial(estimator, correspondence=ordered), ordered=ordered)
+    [(_, told)] = run_all([c for c in checks if c.title == title])
+    return told
 
 
-class Overconfident(Exact):
-    spread = 0.4
+@pytest.mark.parametrize("ordered", [True, False])
+def test_an_estimator_that_is_right_passes(ordered: bool) -> None:
+    check_estimator(partial(Right, correspondence=ordered), ordered=ordered)
 
 
-class Unseeded(Exact):
-    def posterior(self, x: list[FloatArray]) -> Posterior:
-        return GridPosterior(super().posterior(x).mass + np.random.default_rng().random() * 1e-3)  # type: ignore[attr-defined]
+@pytest.mark.parametrize(("title", "estimator"), [(t, e) for t, faults in FAULTS.items() for e in faults])
+def test_each_check_catches_an_estimator_broken_in_just_that_way(title: str, estimator: type[Right]) -> None:
+    told = complaint(estimator, title, ordered=True)
+    assert told is not None
+    assert FAULTS[title][estimator] in told
 
 
-class Global(Exact):
-    def posterior(self, x: list[FloatArray]) -> Posterior:
-        np.random.rand(1)  # noqa: NPY002
-        return super().posterior(x)
+@pytest.mark.parametrize(("title", "estimator"), [(t, e) for t, faults in SET_FAULTS.items() for e in faults])
+def test_each_check_of_sets_catches_an_estimator_broken_in_just_that_way(title: str, estimator: type[Right]) -> None:
+    told = complaint(estimator, title, ordered=False)
+    assert told is not None
+    assert SET_FAULTS[title][estimator] in told
 
 
-class Careless(Exact):
-    def fit(self, theta, x, *, log_weights=None, seed=0):  # type: ignore[no-untyped-def]
-        self.told = True
+def test_no_check_of_the_kit_goes_without_a_fault_that_it_catches() -> None:
+    ordered, sets = ({c.title for c in estimator_checks(Right, ordered=o)} for o in (True, False))
+    assert ordered == set(FAULTS)
+    assert sets - ordered == set(SET_FAULTS)
 
 
-class Brittle(Careless):
-    """NaN in, NaN out; certain of itself when the draws say nothing."""
-
-    def _estimate(self, x: FloatArray) -> FloatArray:
-        return CASE.jacobian.T @ (x - CASE.rest).ravel()
-
-
-def exact_posterior(kind: type[GridPosterior] = GridPosterior) -> Posterior:
-    estimator = Exact()
-    estimator.wrapper = kind
-    theta, x = CASE.draws(20, 0)
-    estimator.fit(theta, x)
-    return estimator.posterior([x[0][0]])
+def test_every_failure_is_told_of_at_once_and_what_is_not_promised_is_left_out() -> None:
+    with pytest.raises(AssertionError, match=r"right breaks 2 promise\(s\)") as raised:
+        check_estimator(faulty.Overconfident)
+    assert "recovers a known posterior" in str(raised.value)
+    check_estimator(faulty.Overconfident, accuracy=False)
 
 
-def test_the_exact_estimator_passes() -> None:
-    kit.check_estimator(Exact)
+def test_the_command_line_checks_points_that_correspond_and_sets_of_them() -> None:
+    titles = [c.title for c in KITS["estimator"](Right)]
+    assert "recovers a known posterior" in titles
+    assert "as a set: the order of points has no influence" in titles
 
 
-@pytest.mark.parametrize(
-    ("check", "kind", "message"),
-    [
-        (lambda p: kit.check_shapes_and_support(p, 2), LeakingPosterior, "outside the unit cube"),
-        (lambda p: kit.check_normalised(p, 2), UnnormalisedPosterior, "integrates to 1.1"),
-        (kit.check_save_and_load, ForgetfulPosterior, "changed between save and load"),
-    ],
-)
-def test_a_broken_posterior_is_caught(
-    check: Callable[[Posterior], None], kind: type[GridPosterior], message: str
-) -> None:
-    check(exact_posterior())
-    with pytest.raises(AssertionError, match=message):
-        check(exact_posterior(kind))
+def test_an_estimator_without_that_option_is_checked_as_it_is() -> None:
+    class Plain(Right):
+        def __init__(self) -> None:
+            super().__init__()
 
-
-@pytest.mark.parametrize(
-    ("check", "broken", "message"),
-    [
-        (kit.check_linear_gaussian, Shifted, "standard deviations off"),
-        (kit.check_linear_gaussian, Overconfident, "times the exact ones"),
-        (kit.check_calibrated, Overconfident, "80 % intervals"),
-        (kit.check_permutation_invariant, Exact, "permuting the points of the measurement"),
-        (kit.check_deterministic, Unseeded, "same draws and seed differ"),
-        (kit.check_global_random_state, Global, "global random state was changed"),
-        (kit.check_too_few_draws, Careless, "three draws are accepted"),
-        (kit.check_failed_draws, Careless, "all-NaN draw is accepted"),
-        (kit.check_constant_summaries, Careless, "draws that tell nothing"),
-        (kit.check_missing_points, Brittle, "finite|NaN|outside"),
-    ],
-)
-def test_a_broken_estimator_is_caught(
-    check: Callable[[kit.MakeEstimator], None], broken: type[Exact], message: str
-) -> None:
-    if check is not kit.check_permutation_invariant:
-        check(Exact)
-    with pytest.raises((AssertionError, ValueError), match=message):
-        check(broken)
+    assert not any("as a set" in c.title for c in KITS["estimator"](Plain))
