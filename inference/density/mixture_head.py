@@ -5,11 +5,13 @@ import math
 import torch
 from torch import Tensor, nn
 
+from .head import Head
+
 # The log of a precision factor may move this far from where it starts; keeps a covariance from collapsing.
 _RANGE = 6.0
 
 
-class MixtureHead(nn.Module):
+class MixtureHead(Head):
     """Features to K Gaussians with full covariance, ``sum_k w_k N(z; m_k, (P_k^T P_k)^-1)``.
 
     ``P_k`` is lower triangular with a positive diagonal, so every output is a proper density: no projection onto
@@ -24,8 +26,8 @@ class MixtureHead(nn.Module):
     """
 
     def __init__(self, inputs: int, dim: int, components: int, scale: Tensor) -> None:
-        super().__init__()
-        self.dim, self.components = dim, components
+        super().__init__(inputs, dim)
+        self.components = components
         self.below = dim * (dim - 1) // 2
         self.layer = nn.Linear(inputs, components * (1 + 2 * dim + self.below))
         with torch.no_grad():
@@ -53,6 +55,9 @@ class MixtureHead(nn.Module):
             off[:, :, row, column] = below.reshape(-1, k, self.below) * self.start.exp()[row]
             factor = factor + off
         return torch.log_softmax(logits, dim=-1), means, factor
+
+    def log_prob(self, features: Tensor, base: Tensor, z: Tensor) -> Tensor:
+        return mixture_log_prob(z, *self(features, base))
 
 
 def mixture_log_prob(z: Tensor, log_weights: Tensor, means: Tensor, factors: Tensor) -> Tensor:

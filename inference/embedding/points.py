@@ -56,10 +56,10 @@ class PointScaler:
         seen = np.asarray(np.isfinite(x).all(axis=3))
         z = np.clip((np.where(seen[..., None], x, 0.0) - self.center) / self.scale, -_LIMIT, _LIMIT)
         z = np.where(seen[..., None], z, 0.0)
-        return _canonical(z, seen) if self.points is None else (z, seen)
+        return canonical(z, seen) if self.points is None else (z, seen)
 
 
-def _canonical(z: FloatArray, seen: BoolArray) -> tuple[FloatArray, BoolArray]:
+def canonical(z: FloatArray, seen: BoolArray) -> tuple[FloatArray, BoolArray]:
     """The points of every frame in lexicographic order, unseen ones last.
 
     A sum of floating-point numbers depends on their order in the last bits; sorted, the embedding of a set is the

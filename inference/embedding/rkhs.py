@@ -18,23 +18,27 @@ class RKHSEmbedding(nn.Module):
 
     Args:
         inputs: coordinates of a point.
-        features: M, the number of frequencies; the embedding has 2 M + 2 numbers.
+        features: M, the number of frequencies; the embedding has 2 M + 2 numbers, or 2 M without the size.
         bandwidth: where sigma starts [standardised coordinates].
         generator: source of the initial frequencies.
+        size: whether the size stands beside the mean; the paper's layer has the mean alone.
     """
 
-    def __init__(self, inputs: int, features: int, bandwidth: float, generator: torch.Generator) -> None:
+    def __init__(
+        self, inputs: int, features: int, bandwidth: float, generator: torch.Generator, size: bool = True
+    ) -> None:
         super().__init__()
+        self.size = size
         self.frequencies = nn.Parameter(torch.randn(inputs, features, generator=generator))
         self.log_bandwidth = nn.Parameter(torch.full((inputs,), math.log(bandwidth)))
 
     @property
     def outputs(self) -> int:
         """Length of a frame's embedding."""
-        return 2 * int(self.frequencies.shape[1]) + 2
+        return 2 * int(self.frequencies.shape[1]) + (2 if self.size else 0)
 
     def forward(self, points: Tensor, seen: Tensor) -> Tensor:
-        """``(..., P, inputs)`` points and a ``(..., P)`` mask to ``(..., 2 M + 2)``.
+        """``(..., P, inputs)`` points and a ``(..., P)`` mask to ``(..., outputs)``.
 
         A frame without any point seen has a mean of zero, and the size features of half a point.
         """
@@ -43,5 +47,7 @@ class RKHSEmbedding(nn.Module):
         count = weight.sum(dim=-1)
         total = torch.cat([weight @ torch.cos(phase), weight @ torch.sin(phase)], dim=-1).squeeze(-2)
         mean = total / (count.clamp(min=1.0) * math.sqrt(self.frequencies.shape[1]))
+        if not self.size:
+            return mean
         size = count.clamp(min=0.5)
         return torch.cat([mean, torch.log(size), torch.rsqrt(size)], dim=-1)

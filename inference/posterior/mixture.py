@@ -1,6 +1,7 @@
 """A posterior on the unit cube: Gaussian mixtures in probit coordinates, normalised exactly."""
 
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import logsumexp, ndtr, ndtri
@@ -11,7 +12,6 @@ from ...core.estimator import Posterior
 
 # Below this distance from a face of the cube the probit is taken at this distance: |z| stays below 7.1.
 _EDGE = 1e-12
-_FORMAT = "muslin-mixture-posterior-1"
 
 
 def to_latent(unit: FloatArray, edge: float = _EDGE) -> FloatArray:
@@ -39,6 +39,8 @@ class MixturePosterior(Posterior):
     Raises:
         InputError: shapes that do not fit, or values that make no density.
     """
+
+    format: ClassVar[str] = "muslin-mixture-posterior-1"
 
     def __init__(self, weights: FloatArray, means: FloatArray, cholesky: FloatArray) -> None:
         weights, means, cholesky = (np.array(a, float) for a in (weights, means, cholesky))
@@ -108,10 +110,34 @@ class MixturePosterior(Posterior):
         first, second = self.weights @ (values @ mass), self.weights @ (values**2 @ mass)
         return np.asarray(np.sqrt(np.maximum(second - first**2, 0.0)), float)
 
+    def quantiles(self, levels: FloatArray) -> FloatArray:
+        """Quantiles ``(Q, D)`` on the unit cube, at levels ``(Q,)``: of a mixture of normals, by bisection."""
+        levels, scale = np.asarray(levels, float), np.sqrt((self.cholesky**2).sum(axis=2))
+        low, high = np.full((len(levels), self.dim), -40.0), np.full((len(levels), self.dim), 40.0)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            below = np.einsum("k,qkd->qd", self.weights, ndtr((middle[:, None] - self.means) / scale))
+            low, high = (
+                np.where(below < levels[:, None], middle, low),
+                np.where(below < levels[:, None], high, middle),
+            )
+        return np.asarray(ndtr(0.5 * (low + high)), float)
+
+    def marginal(self, index: int, at: FloatArray) -> FloatArray:
+        """Density ``(M,)`` of one parameter at places ``(M,)`` on the unit interval, exact; zero outside."""
+        keep = [index]
+        covariance = (self.cholesky[:, keep] ** 2).sum(axis=2)
+        one = MixturePosterior(self.weights, self.means[:, keep], np.sqrt(covariance)[:, :, None])
+        return np.asarray(np.exp(one.log_prob(np.asarray(at, float)[:, None])))
+
+    def components(self) -> tuple[FloatArray, FloatArray]:
+        """Weights ``(K,)`` and the centres ``(K, D)`` of the components, mapped to the unit cube."""
+        return self.weights.copy(), np.asarray(ndtr(self.means), float)
+
     def save(self, path: Path) -> None:
         # Through an open file: given a name, np.savez would append ".npz" to one that lacks it.
         with Path(path).open("wb") as file:
-            np.savez(file, format=_FORMAT, weights=self.weights, means=self.means, cholesky=self.cholesky)
+            np.savez(file, format=self.format, weights=self.weights, means=self.means, cholesky=self.cholesky)
 
     @classmethod
     def load(cls, path: Path) -> "MixturePosterior":
@@ -119,8 +145,8 @@ class MixturePosterior(Posterior):
             raise MissingFileError(f"no posterior at {path}")
         try:
             with np.load(Path(path), allow_pickle=False) as data:
-                if str(data["format"]) != _FORMAT:
-                    raise InputError(f"{path} holds {str(data['format'])!r}, not {_FORMAT!r}")
+                if str(data["format"]) != cls.format:
+                    raise InputError(f"{path} holds {str(data['format'])!r}, not {cls.format!r}")
                 return cls(data["weights"], data["means"], data["cholesky"])
         except (KeyError, OSError, ValueError, AttributeError) as error:
             if isinstance(error, InputError):

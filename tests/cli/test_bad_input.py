@@ -84,7 +84,7 @@ def test_a_grasp_vertex_that_does_not_exist(muslin: Muslin, tmp_path: Path, stud
 def test_an_unknown_plugin(muslin: Muslin, tmp_path: Path, study: Path) -> None:
     new = ("new", "s.toml", "--measurement", "m.zarr", "--scenario", "fling")
     refused(muslin(*new, "--simulator", "mujcoo"), "Did you mean 'mujoco'")
-    refused(muslin(*new, "--estimator", "bayesim"), "Did you mean 'bayessim-rkhs'")
+    refused(muslin(*new, "--estimator", "bayesim-rkhs"), "Did you mean 'bayessim-rkhs'")
     refused(muslin("add", "air-darg", "study.toml"), "Did you mean 'air-drag'")
     refused(muslin("check", "wnid"), "Did you mean 'wind'")
     study.write_text(study.read_text().replace('"mujoco"', '"mujcoo"'))

@@ -120,6 +120,19 @@ def test_recordings_may_differ_in_frames_points_and_correspondence() -> None:
         estimator.posterior([x[0][0]])
 
 
+def test_clouds_of_thousands_of_points_of_any_number_some_missing() -> None:
+    rng = np.random.default_rng(0)
+    theta = rng.random((60, 1))
+    cloud = rng.random((60, 2, 2000, 2)) * np.stack([np.ones((60, 1)), 0.2 + theta], axis=-1)[:, None]
+    cloud[rng.random((60, 2, 2000)) < 0.2] = np.nan
+    cloud[::3, :, 500:] = np.nan
+    estimator = quick(correspondence=False)
+    estimator.fit(theta, [cloud])
+    for count in (300, 3000):
+        row = rng.random((2, count, 2)) * [1.0, 0.2 + 0.5]
+        assert estimator.posterior([row]).mean()[0] == pytest.approx(0.5, abs=0.1)
+
+
 def test_a_marker_lost_only_in_the_measurement_does_not_move_the_mean_far() -> None:
     case = kit.LinearGaussian.make()
     theta, x = case.draws(200, 0)
