@@ -144,10 +144,22 @@ class ScenarioTable(_Table):
 
 
 class EstimatorTable(_OpenTable):
-    """``[estimator]``: which one, how many rounds, how many simulated draws a round."""
+    """``[estimator]``: which one, how many rounds at most, how many simulated draws a round.
+
+    ``proposal``: where the draws of later rounds come from; default ``"truncated"``, and ``"gaussian"``, the
+    paper's, with ``preset = "paper"``. ``stop``: rounds end early once the posterior has moved by less than this
+    [its standard deviations] twice in a row; 0 runs them all.
+    """
 
     rounds: int = Field(default=2, ge=1)
     draws: int = Field(default=120, ge=10)
+    proposal: Literal["truncated", "posterior", "gaussian"] | None = None
+    stop: float = Field(default=0.2, ge=0)
+
+    @property
+    def proposals(self) -> Literal["truncated", "posterior", "gaussian"]:
+        """``proposal``, or the one that goes with the preset."""
+        return self.proposal or ("gaussian" if self.options.get("preset") == "paper" else "truncated")
 
 
 class ParameterTable(_Table):

@@ -142,6 +142,14 @@ class Study:
         """Say which effect is missing; see the step ``diagnose``."""
         return REGISTRY.get("step", "diagnose")(self)
 
+    def calibrate(self, *, simulations: int = 0, predictive: int = 100) -> Any:
+        """Say whether the posterior can be believed; see the step ``calibrate``."""
+        return REGISTRY.get("step", "calibrate")(self, simulations=simulations, predictive=predictive)
+
+    def export(self, kind: str, path: str | Path, **options: Any) -> None:
+        """Write the posterior for other programs; see the step ``export``."""
+        REGISTRY.get("step", "export")(self, kind, Path(path), **options)
+
     def add(self, effect: str, output: str | Path | None = None, *, overwrite: bool = False) -> "Study":
         """A study of the same model with one more effect, its coefficients inferred.
 

@@ -17,7 +17,8 @@ from ...core.store import put, storage_errors
 from ...core.study import Outcome, Study, Task
 from ..noise import Noise
 from ..residuals import Residual, residual
-from ..sequential.fitting import load_fit, offsets_of
+from ..sequential.fitting import offsets_of
+from ..sequential.result import load_fit
 
 #: Posterior draws that are simulated for the scatter of predictions.
 PREDICTIVE = 8

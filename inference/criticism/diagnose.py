@@ -10,7 +10,7 @@ from ...core.arrays import FloatArray
 from ...core.registry import REGISTRY
 from ...core.store import put, read, storage_errors
 from ...core.study import Study
-from ..sequential.fitting import load_fit
+from ..sequential.result import load_fit
 from .candidate import (
     Candidate,
     root_mean_square,

@@ -11,7 +11,8 @@ from ...core.rollout import Trajectory
 from ...core.study import Problem, SimulationPool, Study, Task
 from ..polish import Objective, Polished, polish
 from ..residuals import residual
-from ..sequential.fitting import FitResult, offsets_of
+from ..sequential.fitting import offsets_of
+from ..sequential.result import FitResult
 from .candidate import (
     Candidate,
     best_starts,

@@ -1,6 +1,6 @@
 """Simulated draws on disk: one chunk a draw, whole or absent, so that a killed fit goes on."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -24,12 +24,13 @@ class DrawStore:
     Args:
         study: whose results store is used.
         problem: what is simulated.
+        recordings: for which a rollout is simulated.
         count: draws in all rounds together.
     """
 
-    def __init__(self, study: Study, problem: Problem, count: int) -> None:
+    def __init__(self, study: Study, problem: Problem, recordings: Sequence[str], count: int) -> None:
         self._path = study.results_path
-        self._recordings = list(problem.fit_on)
+        self.recordings = list(recordings)
         made_with = {"fingerprint": study.fingerprint(), "engine": problem.simulator.engine_version()}
         root = study.results("r+")
         with damage_errors(self._path):
@@ -40,20 +41,22 @@ class DrawStore:
         fit = found if isinstance(found, zarr.Group) and "fingerprint" in found.attrs else None
         if fit is None:
             with storage_errors(self._path):
-                fit = self._create(study.results("r+"), problem, count, made_with)
+                fit = self._create(study.results("r+"), problem, self.recordings, count, made_with)
         self.group: zarr.Group = fit
         with damage_errors(self._path):
             self._draws: dict[str, Any] = {name: fit[f"draws/{name}"] for name in ("theta", "status")}
-            self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self._recordings}
+            self._points: dict[str, Any] = {r: fit[f"draws/{_array(r)}"] for r in self.recordings}
             self.status = np.asarray(self._draws["status"][...])
 
     @staticmethod
-    def _create(root: zarr.Group, problem: Problem, count: int, made_with: dict[str, Any]) -> zarr.Group:
+    def _create(
+        root: zarr.Group, problem: Problem, recordings: Sequence[str], count: int, made_with: dict[str, Any]
+    ) -> zarr.Group:
         fit = root.create_group("fit", overwrite=True)
         draws = fit.create_group("draws")
         draws.attrs["parameters"] = list(problem.space.names)
         empty_draws(draws, "theta", (count, len(problem.space)), ["draw", "parameter"], "unit cube", "float64", np.nan)
-        for name in problem.fit_on:
+        for name in recordings:
             series = problem.recordings[name].series
             points = len(problem.scenarios[name].markers)
             put(draws, f"time_{name}", series.time, [f"time_{name}"], "s")
@@ -95,12 +98,12 @@ class DrawStore:
             self._draws["status"][...] = self.status
             self.group.attrs["failures"] = {}
 
-    def tried(self) -> tuple[FloatArray, BoolArray]:
-        """Unit parameters ``(N, D)`` of all draws that were simulated, and which of them failed ``(N,)``."""
-        there = self.status != ABSENT
+    def tried(self, upto: int) -> tuple[FloatArray, BoolArray]:
+        """Unit parameters ``(N, D)`` of the first ``upto`` draws that exist, and which of them failed ``(N,)``."""
+        there = self.status[:upto] != ABSENT
         with damage_errors(self._path):
-            theta = np.asarray(self._draws["theta"][...])[there]
-        return theta, self.status[there] == FAILED
+            theta = np.asarray(self._draws["theta"][:upto])[there]
+        return theta, self.status[:upto][there] == FAILED
 
     def read(self, upto: int) -> tuple[FloatArray, list[FloatArray], IntArray]:
         """Whole draws among the first ``upto``: unit parameters, points a recording, and their numbers."""
@@ -109,7 +112,7 @@ class DrawStore:
         whole = np.flatnonzero(self.status[:upto] == WHOLE)
         with damage_errors(self._path):
             theta = np.asarray(self._draws["theta"][:upto])[whole]
-            points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self._recordings]
+            points = [np.asarray(self._points[r][:upto], dtype=np.float64)[whole] for r in self.recordings]
         if not np.isfinite(theta).all() or not all(np.isfinite(p).all() for p in points):
             raise StoreError(f"{self._path}: draws that were there are gone; move it away and run the fit again")
         return theta, points, whole

@@ -1,9 +1,11 @@
 """Draws that could not be simulated: how many, why, where in the prior, and what that does to the posterior.
 
-Leaving them out does not bias the posterior where draws succeed. If S is the set of parameters that can be
-simulated, what is kept of round r follows q_r restricted to S, and the mixture of all rounds is proportional to
-the sum of n_r q_r on S: the importance weights stay as they are, up to a constant. The posterior is then the one
-under the prior restricted to S, so all that is lost is what the measurement would have said about the rest.
+That a draw fails is information about where draws fail, and later rounds keep away from there
+(:mod:`.success`). Leaving failed draws out does not bias the posterior where draws succeed. If S is the set of
+parameters that can be simulated, what is kept of round r follows its proposal q_r restricted to S, and the mixture
+of all rounds is proportional to the sum of n_r q_r on S, with n_r the draws that were tried: the importance weights
+stay as they are, up to a constant. The posterior is then the one under the prior restricted to S, so all that is
+lost is what the measurement would have said about the rest.
 """
 
 import re

@@ -1,31 +1,145 @@
 """Where the draws of each round come from, and how that is corrected for."""
 
+from typing import Literal, Protocol
+
 import numpy as np
+from scipy.special import logsumexp
 
-from ...core.arrays import FloatArray
+from ...core.arrays import BoolArray, FloatArray
 from ...core.estimator import Posterior
+from ..posterior.mixture import MixturePosterior
+from .division import around, divide
+from .region import Region
+from .success import Success
 
-#: Share of every later round's proposal that is still the prior. It bounds the importance weights
-#: p / p~ by the inverse of the prior's share of all draws.
+Kind = Literal["truncated", "posterior", "gaussian"]
+
+#: Share of every later round's proposal that is still the prior: what an early posterior has missed is found again.
 DEFENSIVE = 0.2
+#: Draws that measure how often a proposal is accepted by the success model.
+_DRAWS = 20_000
 
 
-def propose(density: list[Posterior], count: int, dimension: int, rng: np.random.Generator) -> FloatArray:
-    """Round 0 from the prior; later ones from the latest posterior, with a share of the prior."""
-    prior = rng.random((count, dimension))
-    if not density:
-        return prior
-    take = rng.random(count) >= DEFENSIVE
-    return np.asarray(np.where(take[:, None], density[-1].sample(count, rng), prior))
+class Density(Protocol):
+    """What can be drawn from and evaluated on the unit cube."""
+
+    def sample(self, count: int, rng: np.random.Generator) -> FloatArray: ...
+
+    def log_prob(self, unit: FloatArray) -> FloatArray: ...
 
 
-def log_weights(theta: FloatArray, proposals: list[Posterior]) -> FloatArray:
-    """log p / p~, with p~ the mixture of the proposals of all rounds (balance heuristic).
+class Proposal:
+    """Of one later round: a density with a share of the prior, thinned where draws are likely to fail.
 
-    p is one on the unit cube. Every proposal is a density on the cube, so nothing leaves the positive
-    definite cone as it does when Gaussians are divided.
+    A draw is kept with the probability that it can be simulated, so the density is the product of the two over
+    their mean, which is measured.
+
+    Args:
+        core: where the posterior is.
+        success: None where nothing is known of failures.
+        rng: of what measures the mean.
     """
-    share = np.ones(len(theta))  # round 0: the prior
-    for proposal in proposals:
-        share += DEFENSIVE + (1 - DEFENSIVE) * np.exp(proposal.log_prob(theta))
-    return np.asarray(-np.log(share / (1 + len(proposals))))
+
+    def __init__(self, core: Density, success: Success | None, rng: np.random.Generator) -> None:
+        self._core, self._success, self._log_mean = core, success, 0.0
+        if success is not None:
+            self._log_mean = float(np.log(success.probability(self._plain(_DRAWS, rng)).mean()))
+
+    def plain(self, unit: FloatArray) -> FloatArray:
+        """Log density ``(N,)`` before it is thinned."""
+        return np.asarray(np.logaddexp(np.log(DEFENSIVE), np.log(1 - DEFENSIVE) + self._core.log_prob(unit)))
+
+    def _plain(self, count: int, rng: np.random.Generator) -> FloatArray:
+        core = self._core.sample(count, rng)
+        take = rng.random(count) >= DEFENSIVE
+        return np.asarray(np.where(take[:, None], core, rng.random(core.shape)))
+
+    def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """``(count, D)`` draws."""
+        if self._success is None:
+            return self._plain(count, rng)
+        parts: list[FloatArray] = []
+        while sum(map(len, parts)) < count:
+            draws = self._plain(2 * count, rng)
+            parts.append(draws[rng.random(len(draws)) < self._success.probability(draws)])
+        return np.concatenate(parts)[:count]
+
+    def log_prob(self, unit: FloatArray) -> FloatArray:
+        """Log density ``(N,)`` inside the unit cube."""
+        log_p = self.plain(unit)
+        if self._success is not None:
+            log_p = log_p + np.log(self._success.probability(unit)) - self._log_mean
+        return log_p
+
+
+class Proposals:
+    """The proposals of all rounds so far, and the prior under which the next posterior is learned.
+
+    Draws of all rounds are kept, and follow the mixture p~ of all proposals (equally many a round). A draw weighs
+    ``t / p~`` (balance heuristic, Veach & Guibas 1995; the mixture as a whole, so one badly placed round does no
+    harm), which makes the draws follow the density t, under which the next posterior is learned:
+
+    - ``"truncated"``: t is the latest proposal itself, uniform on the region that holds the latest posterior and on
+      the rest of the box. All draws weigh about the same, and what is learned is the posterior as it is within the
+      region, up to the mass that t has taken from outside: a thousandth by the latest posterior's own account, and
+      where that was wrong the next region grows there;
+    - ``"posterior"``: t is the prior, and draws come from the latest posterior itself;
+    - ``"gaussian"``: t is a Gaussian around the latest posterior, and the learned mixture is divided by it; where
+      that leaves the positive definite cone it is learned anew with t the prior, which is also taken where the
+      estimator learns no mixture.
+
+    Args:
+        kind: as above.
+        dim: D.
+        seed: of everything random.
+    """
+
+    def __init__(self, kind: Kind, dim: int, seed: int) -> None:
+        self.kind, self.dim, self.seed = kind, dim, seed
+        self._later: list[Proposal] = []
+        self._divisor: MixturePosterior | None = None
+
+    def draw(self, count: int) -> FloatArray:
+        """``(count, D)`` draws of the next round; the first round's come from the prior."""
+        rng = np.random.default_rng([self.seed, len(self._later)])
+        return self._later[-1].sample(count, rng) if self._later else rng.random((count, self.dim))
+
+    def add(self, latest: Posterior, theta: FloatArray, failed: BoolArray) -> None:
+        """A round has ended: the next one's draws come from about its posterior.
+
+        Args:
+            latest: posterior of the round.
+            theta: of all draws tried so far ``(N, D)``.
+            failed: which of them failed ``(N,)``.
+        """
+        rng = np.random.default_rng([self.seed, len(self._later), 104_729])
+        core: Density = latest
+        if self.kind == "truncated":
+            core = Region(latest, rng)
+        elif self.kind == "gaussian":
+            core = around(latest, rng)
+            self._divisor = core if isinstance(latest, MixturePosterior) else None
+        self._later.append(Proposal(core, Success.learned(theta, failed), rng))
+
+    def log_weights(self, theta: FloatArray, *, under_prior: bool = False) -> FloatArray | None:
+        """log t / p~ of draws ``(N, D)``; None in the first round, whose draws follow the prior.
+
+        Args:
+            theta: draws, all of them inside the unit cube.
+            under_prior: take the prior for t.
+        """
+        if not self._later:
+            return None
+        each = [np.zeros(len(theta)), *(p.log_prob(theta) for p in self._later)]
+        mixture = np.asarray(logsumexp(each, axis=0)) - np.log(len(each))
+        if self._divisor is not None and not under_prior:
+            return np.asarray(self._divisor.log_prob(theta) - mixture)
+        if self.kind == "truncated" and not under_prior:
+            return np.asarray(self._later[-1].plain(theta) - mixture)
+        return np.asarray(-mixture)
+
+    def corrected(self, learned: Posterior) -> Posterior | None:
+        """The posterior under the prior; None where it must be learned anew with the weights of the prior."""
+        if self._divisor is None:
+            return learned
+        return divide(learned, self._divisor) if isinstance(learned, MixturePosterior) else None

@@ -123,38 +123,3 @@ def test_a_posterior_next_to_failures_is_doubtful(cube: np.ndarray) -> None:
     assert len(failure_notes(SPACE, cube, failed, reasons, inside)) == 1
     assert "cut off there" in failure_notes(SPACE, cube, failed, reasons, beside)[1]
     assert failure_notes(SPACE, cube, np.zeros(400, bool), [], inside) == []
-
-
-def test_leaving_failures_out_leaves_the_posterior_elsewhere_as_it_is() -> None:
-    """One parameter, a Gaussian likelihood, and weighted draws of two rounds of which a part fails.
-
-    The weighted mean of what is kept is that of the posterior restricted to where draws succeed.
-    """
-    from muslin.core.estimator import Posterior
-    from muslin.inference.sequential.proposals import log_weights, propose
-
-    class Narrow(Posterior):
-        """Triangular on [0, 1], highest at 1."""
-
-        dim = 1
-
-        def sample(self, count: int, rng: np.random.Generator) -> np.ndarray:
-            return np.sqrt(rng.random((count, 1)))
-
-        def log_prob(self, unit: np.ndarray) -> np.ndarray:
-            return np.log(2.0 * unit[:, 0])
-
-        def save(self, path: Path) -> None: ...
-
-        @classmethod
-        def load(cls, path: Path) -> "Narrow":
-            return cls()
-
-    rng = np.random.default_rng(3)
-    narrow = Narrow()
-    theta = np.concatenate([propose([], 40_000, 1, rng), propose([narrow], 40_000, 1, rng)])
-    kept = theta[(theta[:, 0] < 0.6)]
-    weight = np.exp(log_weights(kept, [narrow]) - 0.5 * ((kept[:, 0] - 0.5) / 0.2) ** 2)
-    grid = np.linspace(0.0, 0.6, 2001)
-    density = np.exp(-0.5 * ((grid - 0.5) / 0.2) ** 2)
-    assert weight @ kept[:, 0] / weight.sum() == pytest.approx(density @ grid / density.sum(), abs=0.005)

@@ -1,0 +1,100 @@
+"""Takes of the same motion: simulated once, observed as often as they were recorded, and seen as one."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...core.arrays import FloatArray, IntArray
+from ...core.scenario import Scenario
+from ..observe import Observer
+
+#: Scenarios whose clocks [s] and gripper poses [m] differ by less than this are the same.
+_SAME = 1e-6
+#: Draws that are observed at a time; bounds the memory that sixteen takes need.
+_CHUNK = 64
+
+
+class Takes:
+    """Recordings grouped by the rollout that is simulated for them.
+
+    Takes of one motion differ in their noise alone, so one rollout serves them all: it is given the flaws of each
+    take, and the takes are seen together: points that correspond as their mean over the takes in which each was seen,
+    unordered ones as one larger set. The measured takes are put together in the same way, so what an estimator
+    learns is the posterior given all of them. Where the noise is Gaussian the mean holds all that the takes say:
+    standard deviations fall with the root of their number.
+
+    Args:
+        observer: of all recordings.
+        scenarios: by recording.
+    """
+
+    def __init__(self, observer: Observer, scenarios: Mapping[str, Scenario]) -> None:
+        self._observer = observer
+        self._groups: list[list[int]] = []
+        recordings = observer.recordings
+        for i, recording in enumerate(recordings):
+            for group in self._groups:
+                first = recordings[group[0]]
+                if first.series.correspondence == recording.series.correspondence and _same(
+                    scenarios[first.name], scenarios[recording.name]
+                ):
+                    group.append(i)
+                    break
+            else:
+                self._groups.append([i])
+
+    @property
+    def simulated(self) -> list[str]:
+        """Of every group the recording whose scenario is simulated."""
+        return [self._observer.recordings[group[0]].name for group in self._groups]
+
+    def of(self, name: str) -> str:
+        """The recording that is simulated for the one of this name."""
+        for group, first in zip(self._groups, self.simulated, strict=True):
+            if name in (self._observer.recordings[i].name for i in group):
+                return first
+        raise KeyError(name)
+
+    @property
+    def correspondence(self) -> list[bool]:
+        """Of every group, whether its points correspond."""
+        return [self._observer.recordings[group[0]].series.correspondence for group in self._groups]
+
+    def observe(self, points: Sequence[FloatArray], numbers: IntArray, seed: int) -> list[FloatArray]:
+        """Flawed copies of clean draws, one array ``(N, T, P, A)`` a group; see :meth:`Observer.observe`."""
+        where = {i: g for g, group in enumerate(self._groups) for i in group}
+        parts = []
+        for start in range(0, len(numbers), _CHUNK):
+            rows = slice(start, start + _CHUNK)
+            each = [points[where[i]][rows] for i in range(len(where))]
+            parts.append(self._together(self._observer.observe(each, numbers[rows], seed)))
+        return [np.concatenate(p) for p in zip(*parts, strict=True)]
+
+    def measured(self) -> list[FloatArray]:
+        """The real thing in the same form, ``(T, P, A)`` a group."""
+        return self._together(self._observer.measured())
+
+    def _together(self, each: Sequence[FloatArray]) -> list[FloatArray]:
+        """One array a group of one array a recording, ``(..., T, P, A)``."""
+        out = []
+        for group, corresponding in zip(self._groups, self.correspondence, strict=True):
+            if len(group) == 1:
+                out.append(each[group[0]])
+            elif not corresponding:
+                out.append(np.concatenate([each[i] for i in group], axis=-2))
+            else:
+                takes = np.stack([each[i] for i in group])
+                seen = np.isfinite(takes)
+                total, count = np.where(seen, takes, 0.0).sum(axis=0), seen.sum(axis=0)
+                out.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+        return out
+
+
+def _same(a: Scenario, b: Scenario) -> bool:
+    """Whether two scenarios of one study have the same rollouts."""
+    pairs = [(a.times, b.times), (a.motion.times, b.motion.times), (a.motion.poses, b.motion.poses)]
+    return (
+        abs(a.load - b.load) < _SAME
+        and all(x.shape == y.shape and np.allclose(x, y, rtol=0.0, atol=_SAME) for x, y in pairs)
+        and np.array_equal(a.markers, b.markers)
+    )
