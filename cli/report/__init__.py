@@ -6,7 +6,7 @@ from ...core.errors import InputError, MuslinError
 from ...core.store import write_text
 from ...core.study.study import Study
 
-__all__ = ["overview_figure", "write_report"]
+__all__ = ["missing_extra", "overview_figure", "write_report"]
 
 
 def write_report(study: Study, output: Path | None = None, after: Study | None = None) -> Path:
@@ -27,7 +27,7 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
     try:
         from .page import render
     except ImportError as error:
-        raise _missing(error) from error
+        raise missing_extra(error) from error
     path = output or study.path.with_name(f"{study.path.stem}.report.html")
     if after is not None and after.fingerprint("compare")["measured"] != study.fingerprint("compare")["measured"]:
         raise InputError(f"{after.path} is about other recordings than {study.path}; --after takes a study made by add")
@@ -42,11 +42,12 @@ def overview_figure(study: Study, after: Study | None = None) -> bytes:
     try:
         from .overview import draw_overview
     except ImportError as error:
-        raise _missing(error) from error
+        raise missing_extra(error) from error
     return draw_overview(study, after)
 
 
-def _missing(error: ImportError) -> Exception:
+def missing_extra(error: ImportError) -> Exception:
+    """What to raise where pictures cannot be made: which extra to install, or the error itself if that is no matter."""
     if (error.name or "").split(".")[0] in ("matplotlib", "mpl_toolkits", "jinja2"):
         return MuslinError(f"a report needs {error.name}; install it with: pip install 'muslin[report]'")
     return error

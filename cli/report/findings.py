@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import zarr
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.study.study import Study
@@ -104,6 +105,7 @@ class Findings:
         after_name: what "after" has that "before" has not, or "" if there is no after.
         after_inferred: "after" comes from a whole fit of its own, not from the diagnosis.
         hidden: label of a generated measurement.
+        calibration: results of that step, or None.
     """
 
     study: Study
@@ -117,6 +119,7 @@ class Findings:
     after_inferred: bool = False
     after: Study | None = None
     hidden: Table | None = None
+    calibration: zarr.Group | None = None
 
     @property
     def after_label(self) -> str:

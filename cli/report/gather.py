@@ -49,6 +49,7 @@ def gather(study: Study, after: Study | None = None) -> Findings:
         after_inferred=other is not None,
         after=after,
         hidden=_hidden(study),
+        calibration=_step(study, "calibrate"),
     )
 
 

@@ -12,6 +12,7 @@ from markupsafe import Markup, escape
 from ...core.study.study import Study
 from ...core.version import __version__
 from . import words
+from .calibration import calibration_section
 from .figures_error import error_ceiling, error_figure
 from .figures_object import object_figure
 from .figures_points import points_figure
@@ -78,6 +79,7 @@ def context(found: Findings) -> Table:
         "best": words.sentence(best, errors["unit"], errors["noise"], thing(found)) if best else "",
         "pictures": pictures(found, name),
         "player": player_data(found),
+        "calibration": calibration_section(found.calibration),
         "engine": engine(found),
         "hidden": found.hidden,
         "provenance": provenance(found),
@@ -172,6 +174,8 @@ def commands(found: Findings) -> list[str]:
         out.append(f"muslin compare {file}")
     if found.diagnose is not None:
         out.append(f"muslin diagnose {file}")
+    if found.calibration is not None:
+        out.append(f"muslin calibrate {file}")
     if found.after is not None and found.after_inferred:
         other = _quoted(found.after.path.name)
         added = [e for e in found.after.config.effects if e not in found.study.config.effects]
