@@ -44,7 +44,7 @@ lint: $(VENV)/.ready-dev
 		ln -s "$(CURDIR)/$$part" build/types/muslin/$$part; done
 	cd build/types && MYPYPATH=. "$(CURDIR)/$(BIN)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p muslin
 
-bench: bench-calibration bench-hidden-small bench-inference bench-material bench-paper bench-proposals bench-sets bench-sim
+bench: bench-calibration bench-hidden-small bench-inference bench-material bench-proposals bench-sets bench-sim
 
 bench-hidden-small: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/hidden_small.py

@@ -17,6 +17,8 @@ from .trajectory_features import TimePlan, TrajectoryFeatures
 _SHORT = 256
 # Columns that a linear regression reads at most.
 _WIDE = 128
+# ... and at least this many draws for each of them, but for this many columns.
+_DRAWS_EACH, _FEW = 4, 16
 # Part of a parameter's variance that a prediction may leave over and still be read.
 _KNOWS = 0.9
 
@@ -81,7 +83,7 @@ class Reading:
         self.standard = Standard(columns)
         standardised = self.standard(columns)
         unit, weights = draws.unit.numpy(), draws.weights.numpy()
-        self.kept = relevant(standardised, unit, None, weights, _WIDE)
+        self.kept = relevant(standardised, unit, None, weights, max(_FEW, min(_WIDE, len(unit) // _DRAWS_EACH)))
         self.training: FloatArray = standardised[:, self.kept]
         errors = SparseRegression.fit(self.training, unit, weights).residual
         self.shown = relevant(self.training, unit, errors, weights, shown)

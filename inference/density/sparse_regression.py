@@ -1,4 +1,4 @@
-"""The first guess: sparse linear regression with left-out errors, and their covariance, in closed form."""
+"""The first guess: sparse linear regression with left-out errors, and their covariance."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 
 _ROUNDS = 60
+_FOLDS = 5
 _PRECISION = (1e-6, 1e8)
 
 
@@ -15,8 +16,9 @@ class SparseRegression:
     """``y = offset + f B + error``, fitted by evidence, so that features of no use get no weight.
 
     Automatic relevance determination (MacKay 1994; Tipping 2001): every coefficient has a Gaussian prior of its own,
-    whose precision maximises the evidence. The errors are left-out ones, ``(y - f B) / (1 - h)`` with h the leverage
-    at the final precisions.
+    whose precision maximises the evidence. The errors are those of regressions that never saw the draw, precisions
+    included: the closed form for one draw left out takes the precisions as given, and where there are about as many
+    features as draws it promises a tenth of the errors that new draws have.
 
     Args:
         offset: ``(D,)``; coefficients: ``(F, D)``.
@@ -29,26 +31,34 @@ class SparseRegression:
 
     @classmethod
     def fit(cls, features: FloatArray, z: FloatArray, weights: FloatArray) -> "SparseRegression":
-        """From ``(N, F)`` centred features, ``(N, D)`` targets and ``(N,)`` weights of mean one."""
-        root = np.sqrt(weights)[:, None]
-        offset = (weights[:, None] * z).mean(axis=0) / weights.mean()
-        center = (weights[:, None] * features).mean(axis=0) / weights.mean()
-        rows, aim = root * (features - center), root * (z - offset)
-        gram = rows.T @ rows
-        coefficients = np.zeros((features.shape[1], z.shape[1]))
+        """From ``(N, F)`` features, ``(N, D)`` targets and ``(N,)`` weights."""
         residual = np.zeros_like(z)
-        for j in range(z.shape[1]):
-            coefficients[:, j], leverage = _relevance(rows, gram, aim[:, j])
-            residual[:, j] = (z[:, j] - offset[j] - (features - center) @ coefficients[:, j]) / (1.0 - leverage)
-        return cls(np.asarray(offset - center @ coefficients), coefficients, residual)
+        fold = np.arange(len(z)) % _FOLDS
+        for k in range(_FOLDS):
+            kept = fold != k
+            offset, coefficients = _line(features[kept], z[kept], weights[kept])
+            residual[~kept] = z[~kept] - offset - features[~kept] @ coefficients
+        return cls(*_line(features, z, weights), residual)
 
     def mean(self, features: FloatArray) -> FloatArray:
         """``(B, F)`` features to ``(B, D)``."""
         return self.offset + features @ self.coefficients
 
 
-def _relevance(rows: FloatArray, gram: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients ``(F,)`` of one target, and every draw's leverage ``(N,)``."""
+def _line(features: FloatArray, z: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Offset ``(D,)`` and coefficients ``(F, D)``."""
+    weights = weights / weights.mean()
+    root = np.sqrt(weights)[:, None]
+    offset = (weights[:, None] * z).mean(axis=0)
+    center = (weights[:, None] * features).mean(axis=0)
+    rows, aim = root * (features - center), root * (z - offset)
+    gram = rows.T @ rows
+    coefficients = np.stack([_relevance(rows, gram, aim[:, j]) for j in range(z.shape[1])], axis=1)
+    return np.asarray(offset - center @ coefficients), coefficients
+
+
+def _relevance(rows: FloatArray, gram: FloatArray, y: FloatArray) -> FloatArray:
+    """Coefficients ``(F,)`` of one target."""
     draws, count = rows.shape
     aim, total = rows.T @ y, float(y @ y)
     variance = max(total / draws, 1e-12)
@@ -63,8 +73,7 @@ def _relevance(rows: FloatArray, gram: FloatArray, y: FloatArray) -> tuple[Float
         beta = max(draws - known.sum(), 1.0) / error
         if np.abs(mean - before).max(initial=0.0) < 1e-5:
             break
-    leverage = beta * ((rows @ spread) * rows).sum(axis=1)
-    return mean, np.minimum(leverage, 0.9)
+    return mean
 
 
 def shrunk_factor(errors: FloatArray, weights: FloatArray) -> FloatArray:
