@@ -9,8 +9,10 @@ from ..embedding.columns import Standard, relevant
 from ..embedding.components import PrincipalComponents
 from ..embedding.encoder import Encoder
 from ..embedding.moments import moments
+from ..embedding.summaries import BlockSummary
 from .draws import Draws
 from .sparse_regression import SparseRegression
+from .stacked import Seen
 from .trajectory_features import TimePlan, TrajectoryFeatures
 
 # Rows longer than this are read through their principal components.
@@ -45,7 +47,8 @@ class Reading:
         device: where the time model is trained.
 
     Attributes:
-        training: ``(N, F)`` of the training draws: the columns that a linear regression is to read.
+        training: of the training draws: the columns that a linear regression is to read, and what kernel regressions
+            on the coordinates and kernel means of trajectories predict.
         shown: indices of those that a network is to read.
     """
 
@@ -84,9 +87,17 @@ class Reading:
         standardised = self.standard(columns)
         unit, weights = draws.unit.numpy(), draws.weights.numpy()
         self.kept = relevant(standardised, unit, None, weights, max(_FEW, min(_WIDE, len(unit) // _DRAWS_EACH)))
-        self.training: FloatArray = standardised[:, self.kept]
-        errors = SparseRegression.fit(self.training, unit, weights).residual
-        self.shown = relevant(self.training, unit, errors, weights, shown)
+        kept = standardised[:, self.kept]
+        errors = SparseRegression.fit(kept, unit, weights).residual
+        self.shown = relevant(kept, unit, errors, weights, shown)
+        self.smooth = [
+            BlockSummary(rows, draws.unit, draws.weights, principal) for rows in self._whole(points, predicted)
+        ]
+        guess = None
+        if self.smooth:
+            self.choice = torch.stack([s.score for s in self.smooth]).argmin(0).tolist()
+            guess = self._chosen([s.guess for s in self.smooth])
+        self.training = Seen(kept, guess)
 
     def _rows(
         self, points: list[Tensor], seen: list[Tensor], predicted: tuple[Tensor, Tensor] | None
@@ -106,16 +117,28 @@ class Reading:
             long.append(predicted[1])
         return short, long
 
+    def _whole(self, points: list[Tensor], predicted: tuple[Tensor, Tensor] | None) -> list[Tensor]:
+        """Rows for kernel regressions: all corresponding coordinates, and all kernel means; none without frames."""
+        if predicted is None:
+            return []
+        known = [z.flatten(1) for z, flag in zip(points, self.flags, strict=True) if flag]
+        return [predicted[1], torch.cat(known, dim=1)] if known else [predicted[1]]
+
+    def _chosen(self, each: list[Tensor]) -> FloatArray:
+        return np.stack([each[i][:, j].numpy() for j, i in enumerate(self.choice)], axis=1)
+
     def _columns(self, short: list[Tensor], long: list[Tensor]) -> FloatArray:
         projected = [c.scores(r - m) for c, r, m in zip(self.components, long, self.centers, strict=True)]
         return np.asarray(torch.cat([*short, *projected], dim=1).numpy())
 
-    def __call__(self, x: list[FloatArray]) -> FloatArray:
-        """Recordings ``(B, T_r, P, A)`` to ``(B, F)``.
+    def __call__(self, x: list[FloatArray]) -> Seen:
+        """What is read of recordings ``(B, T_r, P, A)``.
 
         Raises:
             InputError: recordings that do not fit those trained on.
         """
         points, seen = self.encoder.points(x)
         predicted = None if self.model is None else self.model(points, seen)
-        return self.standard(self._columns(*self._rows(points, seen, predicted)))[:, self.kept]
+        columns = self.standard(self._columns(*self._rows(points, seen, predicted)))[:, self.kept]
+        rows = self._whole(points, predicted)
+        return Seen(columns, self._chosen([s(r)[1] for s, r in zip(self.smooth, rows, strict=True)]) if rows else None)
