@@ -89,10 +89,9 @@ def _table(p: Parameter) -> str:
 
 
 def _wider(p: Parameter, upper: bool) -> float | None:
-    """A bound that doubles the box on its scale (a decade at least on a log scale); None below zero."""
+    """A bound that doubles the box, or is a decade further on a log scale; None below zero."""
     if p.scale == "log":
-        factor = max(10.0, p.high / p.low)
-        return p.high * factor if upper else p.low / factor
+        return p.high * 10.0 if upper else p.low / 10.0
     if upper:
         return p.high + (p.high - p.low)
     if p.low == 0.0:

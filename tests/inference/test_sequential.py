@@ -192,7 +192,7 @@ def test_the_side_is_said_and_a_wider_bound() -> None:
     )
     stiff, drag = bound_notes(space, found)
     assert "upper bound of its prior, 1000 N/m" in stiff
-    assert "[parameters.stretch_stiffness] high = 1e+05" in stiff
+    assert "[parameters.stretch_stiffness] high = 1e+04" in stiff
     assert "lower than zero" in drag
     assert "[effects.air_drag.coefficient] high = 4" in bound_notes(space, [AtBound(1, True, "posterior")])[0]
 
