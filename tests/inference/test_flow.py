@@ -15,6 +15,7 @@ pytest.importorskip("zuko")
 from muslin.inference.density.coordinates import Coordinates, fitted_scale  # noqa: E402
 from muslin.inference.density.device import device_of  # noqa: E402
 from muslin.inference.density.ensemble import Schedule, left_out, train_ensemble  # noqa: E402
+from muslin.inference.density.first_guess import FirstGuess  # noqa: E402
 from muslin.inference.density.flow import FlowNetwork, FlowShape  # noqa: E402
 from muslin.inference.density.sparse_regression import SparseRegression  # noqa: E402
 from muslin.inference.density.stacking import stack  # noqa: E402
@@ -144,15 +145,28 @@ def test_relevance_finds_the_coefficients_and_left_out_errors() -> None:
     assert fit.residual.std(axis=0) == pytest.approx(error.std(axis=0), rel=0.12)
 
 
-def test_leverage_makes_left_out_errors_those_of_refits() -> None:
+@pytest.mark.parametrize("draws", [80, 100, 400])
+def test_left_out_errors_are_as_large_as_those_of_new_draws(draws: int) -> None:
+    """Also with as many features as draws, most of them noise, where the errors of the fit itself are next to none."""
     rng = np.random.default_rng(1)
-    features = rng.standard_normal((30, 4))
-    z = features @ np.ones((4, 1)) + rng.standard_normal((30, 1))
-    whole = SparseRegression.fit(features, z, np.ones(30))
-    for i in range(5):
-        kept = np.arange(30) != i
-        part = SparseRegression.fit(features[kept], z[kept], np.ones(29))
-        assert whole.residual[i, 0] == pytest.approx((z[i] - part.mean(features[i : i + 1])[0])[0], abs=0.25)
+    slope = np.where(np.arange(80) < 5, 1.0, 0.0)[:, None]
+    features, fresh = rng.standard_normal((draws, 80)), rng.standard_normal((4000, 80))
+    z, new = features @ slope + rng.standard_normal((draws, 1)), fresh @ slope + rng.standard_normal((4000, 1))
+    line = SparseRegression.fit(features, z, np.ones(draws))
+    left_out, met = np.std(line.residual), np.std(new - line.mean(fresh))
+    assert 0.9 * met < left_out < 1.5 * met  # those who left out a fifth know a little less
+
+
+def test_a_first_guess_is_the_better_of_two_parameter_by_parameter() -> None:
+    rng = np.random.default_rng(2)
+    columns = rng.standard_normal((200, 3))
+    z = np.stack([columns[:, 0], np.sin(3 * columns[:, 1])], axis=1) + 0.1 * rng.standard_normal((200, 2))
+    other = np.stack([columns[:, 2], np.sin(3 * columns[:, 1])], axis=1)
+    first = FirstGuess.fit(columns, z, np.ones(200), other)
+    assert first.elsewhere.tolist() == [False, True]
+    assert np.std(first.residual, axis=0) == pytest.approx([0.1, 0.1], rel=0.15)
+    assert first.mean(columns[:1], other[:1])[0] == pytest.approx([columns[0, 0], other[0, 1]], abs=0.1)
+    assert not FirstGuess.fit(columns, z, np.ones(200), None).elsewhere.any()
 
 
 def test_stacking_finds_the_weights_of_a_known_mixture() -> None:

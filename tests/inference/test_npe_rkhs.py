@@ -155,3 +155,26 @@ def test_weights_are_asked_for_after_fit() -> None:
     estimator = quick()
     estimator.fit(theta, x)
     assert sum(estimator.weights.values()) == pytest.approx(1.0)
+
+
+@pytest.mark.slow
+def test_few_draws_of_a_long_trajectory_do_not_make_it_sure_of_itself() -> None:
+    """A hundred draws of 360 numbers with little noise, of which any regression could fit all that it has seen."""
+    rng = np.random.default_rng(0)
+    time, point, axis = np.ogrid[0:1:20j, 0:1:6j, 0:3]
+
+    def simulate(theta: np.ndarray) -> np.ndarray:
+        a, b, c = theta.T[..., None, None, None]
+        bent = np.sin(3 * time * (1 + a) + point + axis) * (0.5 + b) + 0.3 * np.exp(-2 * time * c) * point
+        x: np.ndarray = bent + 0.2 * np.cos(9 * time * b * c + axis)
+        return x + 0.15 * rng.standard_normal(x.shape)
+
+    theta, truth = rng.random((100, 3)), rng.random((60, 3))
+    estimator = NPERKHS()
+    estimator.fit(theta, [simulate(theta)])
+    ranks = [
+        (estimator.posterior([x]).sample(400, rng) < t).mean(axis=0)
+        for t, x in zip(truth, simulate(truth), strict=True)
+    ]
+    held = np.mean((np.array(ranks) > 0.1) & (np.array(ranks) < 0.9), axis=0)
+    assert (held > 0.63).all(), f"80 % intervals hold the truth in {(100 * held).round()} % of cases"
