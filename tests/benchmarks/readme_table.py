@@ -43,8 +43,23 @@ def _cell(rows: list[dict[str, Any]]) -> str:
     return f"{100 * max(errors):.1f} %, {met} of {len(judged)} met" if errors else f"{met} of {len(judged)} met"
 
 
+def posteriors() -> list[str]:
+    """How far estimators are from known posteriors, and the processor seconds of their training."""
+    table = json.loads((RESULTS / "inference.json").read_text())["table"]
+    methods = list(dict.fromkeys(r["method"] for r in table))
+    lines = [f"| task, simulations | {' | '.join(f'`{m}`' for m in methods)} |", "|---" * (len(methods) + 1) + "|"]
+    for task, simulations in dict.fromkeys((r["task"], r["simulations"]) for r in table):
+        cells = [_posterior(r) for r in table if (r["task"], r["simulations"]) == (task, simulations)]
+        lines.append(f"| {task}, {simulations} | {' | '.join(cells)} |")
+    return lines
+
+
+def _posterior(row: dict[str, Any]) -> str:
+    return "–" if row["c2st"] is None else f"{row['c2st']:.3f}, {row['train_cpu_s']:.0f} s"
+
+
 def main() -> None:
-    print("\n".join([*hidden_effects(), "", *materials()]))
+    print("\n".join([*hidden_effects(), "", *materials(), "", *posteriors()]))
 
 
 if __name__ == "__main__":
