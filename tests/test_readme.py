@@ -40,9 +40,25 @@ def test_the_table_of_materials_is_what_the_bench_wrote() -> None:
                 assert line[column].startswith(f"{100 * max(errors):.1f} %")
 
 
+def test_the_table_of_posteriors_is_what_the_benchmark_wrote() -> None:
+    table = json.loads((ROOT / "results/inference.json").read_text())["table"]
+    header = re.search(r"^\| task, simulations \| (.*) \|$", README, re.MULTILINE)
+    assert header
+    methods = [m.strip("`") for m in header[1].split(" | ")]
+    lines = re.findall(r"^\| ([\w ()]+), (\d+) \| (.*) \|$", README, re.MULTILINE)
+    assert {(task, int(n)) for task, n, _ in lines} == {(r["task"], r["simulations"]) for r in table}
+    for task, simulations, cells in lines:
+        for method, cell in zip(methods, cells.split(" | "), strict=True):
+            found = next(
+                r for r in table if [r["task"], r["simulations"], r["method"]] == [task, int(simulations), method]
+            )
+            wanted = "–" if found["c2st"] is None else f"{found['c2st']:.3f}, {found['train_cpu_s']:.0f} s"
+            assert cell == wanted
+
+
 @pytest.mark.parametrize("command", sorted(set(re.findall(r"muslin ([a-z]+(?:-[a-z]+)?) ", README)) & {
     "import", "new", "fit", "compare", "diagnose", "add", "report", "plugins", "check",
-    "bench-material", "compare-simulators", "render"}))  # fmt: skip
+    "bench-material", "compare-simulators", "render", "calibrate", "export"}))  # fmt: skip
 def test_the_commands_of_the_readme_exist(command: str) -> None:
     done = subprocess.run([sys.executable, "-m", "muslin.cli", command, "--help"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
