@@ -8,15 +8,14 @@ import torch
 
 from ...core.arrays import FloatArray
 from ...core.errors import StepMissingError
-from ...core.estimator import PosteriorEstimator
+from ...core.estimator import Posterior, PosteriorEstimator
 from ..density.draws import Draws
 from ..density.training import isolated
-from ..posterior.mixture import MixturePosterior
 from .inputs import checked, flags_of, measured
 from .options import with_options
 
 #: Recordings of one measurement, each ``(1, T_r, P, A)``, to its posterior.
-Answer = Callable[[list[FloatArray]], MixturePosterior]
+Answer = Callable[[list[FloatArray]], Posterior]
 
 
 class TrainedEstimator(PosteriorEstimator):
@@ -68,7 +67,7 @@ class TrainedEstimator(PosteriorEstimator):
         with isolated(seed, self.settings.threads) as generator:
             self._answer = self._train(x, flags, Draws.of(theta, weights), generator)
 
-    def posterior(self, x: list[FloatArray]) -> MixturePosterior:
+    def posterior(self, x: list[FloatArray]) -> Posterior:
         """The posterior given one measurement.
 
         Raises:

@@ -1,28 +1,24 @@
 """Neural posterior estimation for small budgets: several readings of the points, flows and mixtures, stacked."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import torch
 
 from ...core.arrays import FloatArray
 from ...core.errors import InputError, StepMissingError
-from ...core.estimator import PosteriorEstimator
 from ..density.coordinates import NAMES as COORDINATES
 from ..density.device import device_of
 from ..density.draws import Draws
 from ..density.reading import Reading
 from ..density.stacked import Shape, StackedDensity
-from ..density.training import isolated
-from ..posterior.flow import FlowPosterior
-from .inputs import checked, flags_of, measured
+from .base import Answer, TrainedEstimator
 from .npe_settings import PRESETS, Settings
-from .options import with_options
 
 _HEADS = ("mixture", "flow")
 
 
-class NPERKHS(PosteriorEstimator):
+class NPERKHS(TrainedEstimator):
     """q(theta | x): RKHS embedding with a time model, and flows beside mixtures on the errors of a linear density.
 
     - Read are (:class:`~..density.reading.Reading`) the coordinates of corresponding points, the moments of every
@@ -52,12 +48,11 @@ class NPERKHS(PosteriorEstimator):
 
     name: ClassVar[str] = "npe-rkhs"
 
-    def __init__(
-        self, *, correspondence: bool | Sequence[bool] = True, preset: str = "default", **options: Any
-    ) -> None:
-        self.correspondence = correspondence
-        may_be_zero = ("weight_decay", "frames", "points", "time_epochs")
-        self.settings: Settings = with_options(self.name, PRESETS, preset, options, may_be_zero)
+    presets: ClassVar[Mapping[str, Any]] = PRESETS
+    may_be_zero: ClassVar[tuple[str, ...]] = ("weight_decay", "frames", "points", "time_epochs")
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
         self._heads = tuple(self.settings.heads.split("+"))
         if not set(self._heads) <= set(_HEADS):
             raise InputError(f"npe-rkhs: heads must be of {' and '.join(_HEADS)}, not {self.settings.heads!r}")
@@ -65,60 +60,20 @@ class NPERKHS(PosteriorEstimator):
             named = ", ".join(("auto", *COORDINATES))
             raise InputError(f"npe-rkhs: coordinates must be one of {named}, not {self.settings.coordinates!r}")
         self._device = device_of(self.settings.device)
-        self._reading: Reading | None = None
-        self._density: StackedDensity | None = None
+        self._weights: dict[str, float] = {}
 
-    def fit(
-        self, theta: FloatArray, x: list[FloatArray], *, log_weights: FloatArray | None = None, seed: int = 0
-    ) -> None:
-        """Train, replacing whatever was trained before.
-
-        Args:
-            theta: ``(N, D)`` in the unit cube.
-            x: ``(N, T_r, P, A)`` a recording; NaN = not seen.
-            log_weights: ``(N,)``; see :func:`~..density.training.importance_weights` for how they are used. Draws of
-                weight zero are left out.
-            seed: of everything random; the same draws and seed give the same posterior to the bit.
-
-        Raises:
-            InputError: fewer than 10 draws, shapes that do not fit, parameters outside the unit cube, draws in
-                which nothing was seen, or weights that make no sense.
-        """
-        theta, x, weights = checked(theta, x, log_weights)
-        flags, s = flags_of(self.correspondence, len(x)), self.settings
-        self._reading, self._density = None, None
-        with isolated(seed, s.threads) as generator:
-            reading = Reading(
-                x, flags, Draws.of(theta, weights), s.time_plan if s.time_epochs else None, s.principal, s.shown,
-                generator, self._device,
-            )  # fmt: skip
-            shape = Shape(
-                self._heads, s.members, s.held_out, s.coordinates, s.components, s.hidden, s.transforms, s.bins
-            )
-            self._density = StackedDensity(
-                reading.training,
-                reading.shown,
-                theta,
-                weights,
-                shape,
-                s.schedule(len(theta)),
-                generator,
-                self._device,
-            )
-            self._reading = reading
-
-    def posterior(self, x: list[FloatArray]) -> FlowPosterior:
-        """The posterior given one measurement.
-
-        Raises:
-            StepMissingError: before :meth:`fit`.
-            InputError: recordings that do not fit those trained on, or nothing seen in one of them.
-        """
-        if self._reading is None or self._density is None:
-            raise StepMissingError("npe-rkhs has no posterior before fit")
-        batch = measured(x)
-        with isolated(0, self.settings.threads), torch.no_grad():
-            return self._density.posterior(self._reading(batch))
+    def _train(self, x: list[FloatArray], flags: tuple[bool, ...], draws: Draws, generator: torch.Generator) -> Answer:
+        s: Settings = self.settings
+        reading = Reading(
+            x, flags, draws, s.time_plan if s.time_epochs else None, s.principal, s.shown, generator, self._device
+        )
+        shape = Shape(self._heads, s.members, s.held_out, s.coordinates, s.components, s.hidden, s.transforms, s.bins)
+        unit, weights = draws.unit.numpy(), draws.weights.numpy()
+        density = StackedDensity(
+            reading.training, reading.shown, unit, weights, shape, s.schedule(len(unit)), generator, self._device
+        )
+        self._weights = density.weights
+        return lambda batch: density.posterior(reading(batch))
 
     @property
     def weights(self) -> dict[str, float]:
@@ -127,6 +82,6 @@ class NPERKHS(PosteriorEstimator):
         Raises:
             StepMissingError: before :meth:`fit`.
         """
-        if self._density is None:
+        if self._answer is None:
             raise StepMissingError("npe-rkhs has no weights before fit")
-        return dict(self._density.weights)
+        return dict(self._weights)

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.special import logsumexp
 
 from ...core.arrays import FloatArray
-from ...core.errors import InputError, MissingFileError
+from ...core.errors import InputError
 from ...core.estimator import Posterior
+from .archive import open_archive, write_archive
 from .latent import LatentDensity, latent_density
 
 
@@ -67,30 +68,17 @@ class FlowPosterior(Posterior):
         return np.asarray(np.where(inside, logsumexp(each, axis=0), -np.inf))
 
     def save(self, path: Path) -> None:
-        arrays: dict[str, Any] = {"format": self.format, "part_weights": self.weights}
+        arrays: dict[str, Any] = {}
         for m, part in enumerate(self.parts):
             arrays |= {f"part_{m}/{k}": v for k, v in part.arrays().items()}
-        # Through an open file: given a name, np.savez would append ".npz" to one that lacks it.
-        with Path(path).open("wb") as file:
-            np.savez(file, **arrays)
+        write_archive(path, self.format, part_weights=self.weights, **arrays)
 
     @classmethod
     def load(cls, path: Path) -> "FlowPosterior":
-        if not Path(path).is_file():
-            raise MissingFileError(f"no posterior at {path}")
-        try:
-            with np.load(Path(path), allow_pickle=False) as data:
-                if str(data["format"]) != cls.format:
-                    raise InputError(f"{path} holds {str(data['format'])!r}, not {cls.format!r}")
-                weights = data["part_weights"]
-                parts = []
-                for m in range(len(weights)):
-                    start = f"part_{m}/"
-                    parts.append(
-                        latent_density({k.removeprefix(start): data[k] for k in data.files if k.startswith(start)})
-                    )
-                return cls(weights, parts)
-        except (KeyError, OSError, ValueError, TypeError, AttributeError, RuntimeError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path} is not a saved flow posterior: {error}") from error
+        with open_archive(path, cls.format) as data:
+            parts = []
+            for m in range(len(data["part_weights"])):
+                start = f"part_{m}/"
+                arrays = {k.removeprefix(start): data[k] for k in data.files if k.startswith(start)}
+                parts.append(latent_density(arrays))
+            return cls(data["part_weights"], parts)

@@ -1,17 +1,16 @@
 """Information adds up: the posterior given several measurements, from the posteriors given each."""
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import logsumexp
 
 from ...core.arrays import FloatArray
-from ...core.errors import InputError, MissingFileError
+from ...core.errors import InputError
 from ...core.estimator import Posterior
-from .files import load_posterior
+from .archive import open_archive, parts_as_arrays, parts_in, write_archive
 from .mixture import MixturePosterior, to_latent
 
 #: Draws of a step towards the product, kernels of a proposal, and draws that measure the normaliser.
@@ -108,36 +107,19 @@ class FusedPosterior(Posterior):
 
     def save(self, path: Path) -> None:
         p = self._proposal
-        arrays: dict[str, Any] = {"weights": p.weights, "means": p.means, "cholesky": p.cholesky}
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "part.npz"
-            for k, part in enumerate(self.parts):
-                part.save(file)
-                arrays[f"part_{k}"] = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-        numbers = np.array([self._log_normaliser, self._log_most])
-        with Path(path).open("wb") as out:
-            np.savez(out, format=self.format, numbers=numbers, **arrays)
+        write_archive(
+            path, self.format, weights=p.weights, means=p.means, cholesky=p.cholesky,
+            numbers=np.array([self._log_normaliser, self._log_most]), **parts_as_arrays(self.parts),
+        )  # fmt: skip
 
     @classmethod
     def load(cls, path: Path) -> "FusedPosterior":
-        if not Path(path).is_file():
-            raise MissingFileError(f"no posterior at {path}")
-        try:
-            with np.load(Path(path), allow_pickle=False) as data, tempfile.TemporaryDirectory() as folder:
-                if str(data["format"]) != cls.format:
-                    raise InputError(f"{path} holds {str(data['format'])!r}, not {cls.format!r}")
-                made = cls.__new__(cls)
-                made._proposal = MixturePosterior(data["weights"], data["means"], data["cholesky"])
-                made._log_normaliser, made._log_most = (float(v) for v in data["numbers"])
-                made.parts, file = [], Path(folder) / "part.npz"
-                while (name := f"part_{len(made.parts)}") in data:
-                    file.write_bytes(data[name].tobytes())
-                    made.parts.append(load_posterior(file))
-                return made
-        except (KeyError, OSError, ValueError, AttributeError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path} is not a saved fused posterior: {error}") from error
+        with open_archive(path, cls.format) as data:
+            made = cls.__new__(cls)
+            made._proposal = MixturePosterior(data["weights"], data["means"], data["cholesky"])
+            made._log_normaliser, made._log_most = (float(v) for v in data["numbers"])
+            made.parts = parts_in(data)
+            return made
 
 
 def _worth(log_w: FloatArray) -> float:

@@ -7,8 +7,9 @@ import numpy as np
 from scipy.special import logsumexp, ndtr, ndtri
 
 from ...core.arrays import FloatArray
-from ...core.errors import InputError, MissingFileError
+from ...core.errors import InputError
 from ...core.estimator import Posterior
+from .archive import open_archive, write_archive
 
 # Below this distance from a face of the cube the probit is taken at this distance: |z| stays below 7.1.
 _EDGE = 1e-12
@@ -135,20 +136,9 @@ class MixturePosterior(Posterior):
         return self.weights.copy(), np.asarray(ndtr(self.means), float)
 
     def save(self, path: Path) -> None:
-        # Through an open file: given a name, np.savez would append ".npz" to one that lacks it.
-        with Path(path).open("wb") as file:
-            np.savez(file, format=self.format, weights=self.weights, means=self.means, cholesky=self.cholesky)
+        write_archive(path, self.format, weights=self.weights, means=self.means, cholesky=self.cholesky)
 
     @classmethod
     def load(cls, path: Path) -> "MixturePosterior":
-        if not Path(path).is_file():
-            raise MissingFileError(f"no posterior at {path}")
-        try:
-            with np.load(Path(path), allow_pickle=False) as data:
-                if str(data["format"]) != cls.format:
-                    raise InputError(f"{path} holds {str(data['format'])!r}, not {cls.format!r}")
-                return cls(data["weights"], data["means"], data["cholesky"])
-        except (KeyError, OSError, ValueError, AttributeError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path} is not a saved mixture posterior: {error}") from error
+        with open_archive(path, cls.format) as data:
+            return cls(data["weights"], data["means"], data["cholesky"])

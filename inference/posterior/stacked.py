@@ -1,17 +1,16 @@
 """Posteriors of whatever kind, mixed with fixed weights."""
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import logsumexp
 
 from ...core.arrays import FloatArray
-from ...core.errors import InputError, MissingFileError
+from ...core.errors import InputError
 from ...core.estimator import Posterior
-from .files import load_posterior
+from .archive import open_archive, parts_as_arrays, parts_in, write_archive
 
 
 class StackedPosterior(Posterior):
@@ -53,29 +52,9 @@ class StackedPosterior(Posterior):
         return np.asarray(logsumexp(each, axis=0))
 
     def save(self, path: Path) -> None:
-        arrays: dict[str, Any] = {}
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "part.npz"
-            for k, part in enumerate(self.parts):
-                part.save(file)
-                arrays[f"part_{k}"] = np.frombuffer(file.read_bytes(), dtype=np.uint8)
-        with Path(path).open("wb") as out:
-            np.savez(out, format=self.format, part_weights=self.weights, **arrays)
+        write_archive(path, self.format, part_weights=self.weights, **parts_as_arrays(self.parts))
 
     @classmethod
     def load(cls, path: Path) -> "StackedPosterior":
-        if not Path(path).is_file():
-            raise MissingFileError(f"no posterior at {path}")
-        try:
-            with np.load(Path(path), allow_pickle=False) as data, tempfile.TemporaryDirectory() as folder:
-                if str(data["format"]) != cls.format:
-                    raise InputError(f"{path} holds {str(data['format'])!r}, not {cls.format!r}")
-                weights, parts, file = data["part_weights"], [], Path(folder) / "part.npz"
-                for k in range(len(weights)):
-                    file.write_bytes(data[f"part_{k}"].tobytes())
-                    parts.append(load_posterior(file))
-                return cls(weights, parts)
-        except (KeyError, OSError, ValueError, AttributeError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path} is not a saved mixture of posteriors: {error}") from error
+        with open_archive(path, cls.format) as data:
+            return cls(data["part_weights"], parts_in(data))

@@ -6,6 +6,8 @@ from muslin.core.testing import estimators as kit
 
 torch = pytest.importorskip("torch")
 
+from torch_state import check_torch_is_left_alone  # noqa: E402
+
 from muslin.inference.density.training import importance_weights  # noqa: E402
 from muslin.inference.estimators.bayessim_rkhs import BayesSimRKHS  # noqa: E402
 
@@ -41,23 +43,7 @@ def test_mean_and_sd_are_near_the_exact_ones_of_a_linear_gaussian_case() -> None
 
 
 def test_torch_generator_and_threads_are_left_alone_and_do_not_matter() -> None:
-    theta, x = kit.LinearGaussian.make().draws(40, 0)
-    grid = np.random.default_rng(0).random((20, 2))
-    before = torch.get_num_threads()
-    answers = []
-    try:
-        for threads in (1, 2):
-            torch.set_num_threads(threads)
-            torch.manual_seed(threads)
-            state = torch.get_rng_state()
-            estimator = quick()
-            estimator.fit(theta, x, seed=3)
-            answers.append(estimator.posterior([x[0][0]]).log_prob(grid))
-            assert torch.equal(state, torch.get_rng_state())
-            assert torch.get_num_threads() == threads
-    finally:
-        torch.set_num_threads(before)
-    assert np.array_equal(*answers)
+    check_torch_is_left_alone(quick)
 
 
 def test_another_seed_gives_another_posterior() -> None:

@@ -9,6 +9,8 @@ from muslin.core.testing import estimators as kit
 torch = pytest.importorskip("torch")
 pytest.importorskip("zuko")
 
+from torch_state import check_torch_is_left_alone  # noqa: E402
+
 from muslin.inference.embedding.columns import Standard, relevant  # noqa: E402
 from muslin.inference.embedding.moments import moments  # noqa: E402
 from muslin.inference.estimators.npe_rkhs import NPERKHS  # noqa: E402
@@ -92,23 +94,7 @@ def test_moments_are_those_of_the_points_seen() -> None:
 
 
 def test_torch_generator_and_threads_are_left_alone_and_do_not_matter() -> None:
-    theta, x = kit.LinearGaussian.make().draws(40, 0)
-    grid = np.random.default_rng(0).random((20, 2))
-    before = torch.get_num_threads()
-    answers = []
-    try:
-        for threads in (1, 2):
-            torch.set_num_threads(threads)
-            torch.manual_seed(threads)
-            state = torch.get_rng_state()
-            estimator = quick()
-            estimator.fit(theta, x, seed=3)
-            answers.append(estimator.posterior([x[0][0]]).log_prob(grid))
-            assert torch.equal(state, torch.get_rng_state())
-            assert torch.get_num_threads() == threads
-    finally:
-        torch.set_num_threads(before)
-    assert np.array_equal(*answers)
+    check_torch_is_left_alone(quick)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a graphics processor")
