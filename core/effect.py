@@ -46,6 +46,8 @@ class Effect(ABC):
     needs: ClassVar[frozenset[str]] = frozenset()
     #: Whether it only ever takes energy away from the object.
     dissipative: ClassVar[bool] = False
+    #: Whether a diagnosis tries it without being told to.
+    candidate: ClassVar[bool] = True
     #: One clause that completes "the object ...": what one sees when the effect is missing from a model.
     symptom: ClassVar[str] = "moves differently"
 

@@ -111,6 +111,10 @@ class Simulator(ABC):
         """
         return None
 
+    def finer(self) -> "Simulator | None":
+        """The same with half its time step, to see how far its numbers are from converged; None if there is none."""
+        return None
+
     @abstractmethod
     def engine_version(self) -> str:
         """Name and version of the engine underneath, recorded with every result."""

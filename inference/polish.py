@@ -7,9 +7,11 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core.arrays import FloatArray
+from ..core.measurement import Recording
 from ..core.parameters import ParameterSpace
 from ..core.rollout import Trajectory
 from ..core.study import SimulationPool, Task
+from .discrepancy import NONE, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, failed, residual
 
@@ -54,6 +56,7 @@ class Objective:
         space: parameters, in the order of the unit vector.
         recordings: names.
         fixed: values of other parameters.
+        discrepancy: how else than by noise a right model may be off; residuals are whitened by it too.
     """
 
     def __init__(
@@ -64,8 +67,10 @@ class Objective:
         noise: Noise,
         offsets: Offsets,
         fixed: dict[str, float] | None = None,
+        discrepancy: Discrepancy = NONE,
     ) -> None:
         self.pool, self.space, self.recordings = pool, space, list(recordings)
+        self.discrepancy = discrepancy
         self.noise, self.offsets, self.fixed = noise, offsets, dict(fixed or {})
         self._last: tuple[FloatArray, FloatArray] | None = None
 
@@ -81,12 +86,17 @@ class Objective:
         for _ in units:
             pairs = [(self.pool.problem.recordings[name], next(outcomes)) for name in self.recordings]
             whole = [(r, o) for r, o in pairs if isinstance(o, Trajectory)]
-            rows.append(
-                np.concatenate([residual(r, o.series, self.noise, self.offsets).white for r, o in whole])
-                if len(whole) == len(pairs)
-                else None
-            )
+            rows.append(np.concatenate([self._white(r, o) for r, o in whole]) if len(whole) == len(pairs) else None)
         return rows
+
+    def _white(self, recording: Recording, predicted: Trajectory) -> FloatArray:
+        white = residual(recording, predicted.series, self.noise, self.offsets).white
+        return self.discrepancy.whitened(recording.name, white)
+
+    def parts(self, white: FloatArray) -> dict[str, FloatArray]:
+        """White residuals ``(N,)`` by recording."""
+        sizes = [len(failed(self.pool.problem.recordings[name], self.offsets)) for name in self.recordings]
+        return dict(zip(self.recordings, np.split(white, np.cumsum(sizes)[:-1]), strict=True))
 
     def one(self, unit: FloatArray) -> FloatArray:
         """White residuals ``(N,)`` at ``unit (D,)``; a failed rollout counts as far off everywhere."""

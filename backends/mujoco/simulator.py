@@ -43,6 +43,9 @@ class MujocoSimulator(Simulator):
             raise InputError(f"simulator 'mujoco': time_step must be in (0, 0.05] s, but is {time_step:g}")
         self.time_step = time_step
 
+    def finer(self) -> "MujocoSimulator":
+        return type(self)(time_step=self.time_step / 2)
+
     def engine_version(self) -> str:
         return f"mujoco {engine().__version__}"
 

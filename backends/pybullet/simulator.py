@@ -80,5 +80,8 @@ class PybulletSimulator(Simulator):
         finally:
             world.close()
 
+    def finer(self) -> "PybulletSimulator":
+        return type(self)(time_step=self.time_step / 2, most_substeps=self.most_substeps)
+
     def engine_version(self) -> str:
         return library.version()

@@ -185,10 +185,11 @@ class NuisanceTable(_Table):
 
 
 class DiagnoseTable(_Table):
-    """``[diagnose]``: which effects to try."""
+    """``[diagnose]``: which effects to try, from how many points each at most, with how many simulations in all."""
 
     candidates: list[str] | None = None
-    draws: int = Field(default=16, ge=2)
+    draws: int = Field(default=16, ge=4)
+    simulations: int = Field(default=1500, ge=100)
 
 
 class StudyConfig(_Table):

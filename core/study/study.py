@@ -142,6 +142,14 @@ class Study:
         """Say which effect is missing; see the step ``diagnose``."""
         return REGISTRY.get("step", "diagnose")(self)
 
+    def next_experiment(self, **options: Any) -> Any:
+        """Propose the motion that settles what the diagnosis left open; see the step ``next``."""
+        return REGISTRY.get("step", "next")(self, **options)
+
+    def unknown(self) -> Any:
+        """Estimate the force that the model lacks, and the law that it follows; see the step ``unknown``."""
+        return REGISTRY.get("step", "unknown")(self)
+
     def calibrate(self, *, simulations: int = 0, predictive: int = 100) -> Any:
         """Say whether the posterior can be believed; see the step ``calibrate``."""
         return REGISTRY.get("step", "calibrate")(self, simulations=simulations, predictive=predictive)
@@ -158,7 +166,10 @@ class Study:
             output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one.
             overwrite: replace a file that is there.
         """
-        REGISTRY.get("effect", effect)
+        if not REGISTRY.get("effect", effect).candidate:
+            raise InputError(
+                f"{effect!r} is no effect by itself; muslin unknown finds one, muslin add --law FILE adds it"
+            )
         if effect in self.config.effects:
             raise InputError(f"{self.path} has {effect!r} already")
         path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")

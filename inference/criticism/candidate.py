@@ -1,7 +1,7 @@
 """One candidate effect: screened over its prior, refitted jointly with the parameters, held out."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import stats
@@ -25,6 +25,9 @@ class Candidate:
         base: number of parameters that are not coefficients of this effect.
         fit: jointly polished, in units of the noise.
         held_out: root mean square error on each held-out recording [unit].
+        held_out_white: mean square of all of them, whitened by noise and numerics [noise variances].
+        numerics: what errors of the numbers themselves explain in the fit's residuals [noise variances].
+        promised: residual sum of squares that a linear model promised at the first look.
     """
 
     name: str
@@ -32,10 +35,18 @@ class Candidate:
     base: int
     fit: Polished
     held_out: dict[str, float] = field(default_factory=dict)
+    held_out_white: float = float("nan")
+    numerics: float = 0.0
+    promised: float = float("inf")
 
     @property
     def rss(self) -> float:
         return self.fit.rss
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What candidates are put in order by, smallest first: what they reach, then what they promise."""
+        return self.rss, self.promised
 
     @property
     def coefficients(self) -> dict[str, tuple[float, float, str]]:
@@ -82,12 +93,6 @@ class Candidate:
         return float(np.linalg.norm(effect - basis @ (basis.T @ effect)) / total)
 
 
-def effect_start(space: ParameterSpace, base: int, plain: FloatArray) -> FloatArray:
-    """The plain fit in the larger cube: every coefficient zero."""
-    zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(space)[base:]])
-    return np.concatenate([plain, zero])
-
-
 def screening_points(
     space: ParameterSpace, base: int, starts: FloatArray, count: int, rng: np.random.Generator
 ) -> FloatArray:
@@ -104,40 +109,10 @@ def screening_points(
     return np.asarray(points)
 
 
-def newton_point(fit: Polished) -> tuple[FloatArray, float]:
-    """Where a linear model of the residuals has its least square ``(D,)``, inside the cube, and that square.
-
-    Steps of a bounded search from near a bound are short; this looks at what lies behind them.
-    """
-    step = -fit.covariance @ (fit.jacobian.T @ fit.white)
-    left = fit.white + fit.jacobian @ step
-    return np.clip(fit.unit + step, 0.01, 0.99), float(left @ left)
-
-
-def responds(objective: Objective, start: FloatArray, base: int) -> bool:
-    """Does anything at all change when every coefficient takes a quarter of its prior range?
-
-    A lag of grippers that never move, say, cannot be seen, and need not be refitted.
-    """
-    strong = start.copy()
-    strong[base:] = np.where(start[base:] < 0.7, start[base:] + 0.25, start[base:] - 0.25)
-    plain, moved = objective.many(np.stack([start, strong]))
-    return plain is None or moved is None or not np.array_equal(plain, moved)
-
-
-def unchanged(plain: Polished, start: FloatArray, response: FloatArray) -> Polished:
-    """The plain fit as the fit of an effect without any ``response (N, coefficients)`` in the data."""
-    extra = len(start) - len(plain.unit)
-    covariance = np.zeros((len(start), len(start)))
-    covariance[: len(plain.unit), : len(plain.unit)] = plain.covariance
-    covariance[len(plain.unit) :, len(plain.unit) :] = np.eye(extra) / 12.0  # of the prior
-    return replace(plain, unit=start, covariance=covariance, jacobian=np.hstack([plain.jacobian, response]))
-
-
-def best_starts(objective: Objective, points: FloatArray) -> list[FloatArray]:
-    """``points`` from the smallest residual to the largest."""
-    sizes = [np.inf if w is None else float(w @ w) for w in objective.many(points)]
-    return [points[k] for k in np.argsort(sizes)]
+def best_starts(objective: Objective, points: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+    """``points`` and their white residuals from the smallest residual to the largest; failed ones are left out."""
+    rows = [(p, w) for p, w in zip(points, objective.many(points), strict=True) if w is not None]
+    return sorted(rows, key=lambda row: float(row[1] @ row[1]))
 
 
 def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
@@ -147,8 +122,12 @@ def z_value(rss_without: float, candidate: Candidate, tried: int) -> float:
     is wrong anyway does not make every effect significant.
     """
     scale = max(1.0, candidate.rss / candidate.fit.count)
-    drop = max(0.0, rss_without - candidate.rss) / scale
-    log_p = stats.chi2.logsf(drop, len(candidate.space) - candidate.base) + np.log(tried)
+    return drop_z(max(0.0, rss_without - candidate.rss) / scale, len(candidate.space) - candidate.base, tried)
+
+
+def drop_z(drop: float, coefficients: int, tried: int) -> float:
+    """The same of a ``drop`` in -2 log likelihood by so many coefficients."""
+    log_p = stats.chi2.logsf(drop, coefficients) + np.log(tried)
     if log_p > -1e-3:
         return 0.0
     if log_p > -600:

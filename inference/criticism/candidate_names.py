@@ -29,7 +29,8 @@ def candidate_names(study: Study) -> list[str]:
         reason = why_powerless(effect, problem.simulator, scenario)
         if told is not None and reason is not None:
             raise InputError(f"[diagnose.candidates]: {reason}")
-        if name not in study.config.effects and reason is None:
+        wanted = told is not None or effect.candidate
+        if name not in study.config.effects and reason is None and wanted:
             out.append(name)
     if not out:
         raise InputError(f"{study.path}: no candidate effect is left to try; see: muslin plugins")

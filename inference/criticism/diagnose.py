@@ -4,24 +4,22 @@ import time
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from ...core.arrays import FloatArray
 from ...core.registry import REGISTRY
 from ...core.store import put, read, storage_errors
 from ...core.study import Study
 from ..sequential.result import load_fit
-from .candidate import (
-    Candidate,
-    root_mean_square,
-)
+from .before_after import BeforeAfter
+from .candidate import Candidate
 from .candidate_names import candidate_names
-from .sentences import explain
-from .stage import Stage, Work, chosen_of
-from .verdict import has_misfit
+from .sentences import explain, told
+from .stepwise import Findings, find
+from .verdict import objection
+from .where import where_it_is
+from .work import Work
 
-#: Effects that one diagnosis may name, one after the other.
-MOST_EFFECTS = 2
+#: Models whose fits are kept, for steps that go on from them.
+KEPT = 4
 
 
 @dataclass(frozen=True)
@@ -47,32 +45,26 @@ def diagnose(study: Study) -> Diagnosis:
     problem = replace(study.problem, effects={**study.problem.effects, **effects})
     with study.pool(problem) as pool:
         work = Work(study, problem, pool, fit)
-        stages = [work.stage((), names, _fitted(study))]
-        while (
-            stages[-1].decision.verdict == "named"
-            and len(stages) < MOST_EFFECTS
-            and has_misfit(replace(stages[-1].evidence, rss_plain=chosen_of(stages[-1]).rss))
-        ):
-            chosen = chosen_of(stages[-1])
-            done = (*stages[-1].effects, chosen.name)
-            rest = [n for n in names if n not in done]
-            if not rest:
-                break
-            stages.append(work.stage(done, rest, chosen.fit))
-        named = tuple(e for s in stages if s.decision.verdict == "named" for e in s.decision.effects)
-        after = _last_model(stages)
-        curves = work.curves(stages[0], after)
-        count = pool.count
-    result = _result(study, stages, named, after, work, count, time.monotonic() - began)
-    together = stages[0].evidence.explained(after)
-    paragraphs = explain(result, effects, stages[0].evidence, together, len(problem.hold_out))
+        found = find(work, names, _fitted(study))
+        pair = BeforeAfter(work, (work.space(()), found.first.plain.unit), (found.after.space, found.after.fit.unit))
+        count = work.count
+    result = _result(study, found, pair, work, count, time.monotonic() - began)
+    result["told"] = told(study, result, effects)
+    paragraphs = explain(result)
     with storage_errors(study.results_path):
         group = study.results("r+").create_group("diagnose", overwrite=True)
-        for name, arrays in curves.items():
+        for name, arrays in pair.arrays().items():
             sub = group.create_group(name)
             for key, (data, dims, unit) in arrays.items():
                 put(sub, key, data, dims, unit)
-        group.attrs.update({"result": result, "text": list(paragraphs), "fingerprint": study.fingerprint("diagnose")})
+        group.attrs.update(
+            {
+                "result": result,
+                "text": list(paragraphs),
+                "models": _models(found),
+                "fingerprint": study.fingerprint("diagnose"),
+            }
+        )
         group.attrs["finished"] = True
     return Diagnosis(result, tuple(paragraphs))
 
@@ -81,56 +73,75 @@ def _fitted(study: Study) -> FloatArray:
     return read(study.step_results("fit"), "estimate_unit")
 
 
-def _last_model(stages: list[Stage]) -> Candidate:
-    """The model with what was named; where nothing was, the candidate that came nearest."""
-    named = [s for s in stages if s.decision.verdict == "named"]
-    if named:
-        return chosen_of(named[-1])
-    if stages[0].decision.effects:  # tied: the first of them
-        return chosen_of(stages[0])
-    return min(stages[0].evidence.candidates, key=lambda c: c.rss)
+def _models(found: Findings) -> list[dict[str, Any]]:
+    """The fitted models that came nearest, best first."""
+    best = sorted(found.first.evidence.candidates, key=lambda c: c.rank)[:KEPT]
+    best += [c for c in found.first.evidence.candidates if c.name in found.effects and c not in best]
+    each: list[tuple[list[str], Candidate]] = [([c.name], c) for c in best]
+    if len(found.effects) > 1 and found.verdict == "named":
+        each.insert(0, (list(found.effects), found.after))
+    return [
+        {
+            "effects": names,
+            "values": c.space.as_dict(c.space.from_unit(c.fit.unit)),
+            "parameters": list(c.space.names),
+            "unit": c.fit.unit.tolist(),
+            "covariance": c.fit.covariance.tolist(),
+            "rss": c.rss,
+        }
+        for names, c in each
+    ]
 
 
-def _result(
-    study: Study,
-    stages: list[Stage],
-    named: tuple[str, ...],
-    after: Candidate,
-    work: Work,
-    count: int,
-    seconds: float,
-) -> dict[str, Any]:
-    first = stages[0]
+def _result(study: Study, found: Findings, pair: BeforeAfter, work: Work, count: int, seconds: float) -> dict[str, Any]:
+    first, after = found.first, found.after
     e = first.evidence
-    held = not np.isnan(e.held_out_plain)
-    before = e.held_out_plain if held else work.fitted_error(first.plain)
-    later = root_mean_square(list(after.held_out.values())) if held else work.fitted_error(after.fit)
+    problem = work.problem
+    before, later = pair.error(problem.hold_out or problem.fit_on)
+    fitted = pair.error(problem.fit_on)
+    held = bool(problem.hold_out)
     rows = []
-    for c in sorted(e.candidates, key=lambda c: c.rss):
+    for c in sorted(e.candidates, key=lambda c: c.rank):
         # of effects that were named together, what they are together
-        coefficients = after.coefficients_of(c.name) if c.name in named else c.coefficients
+        named_together = found.verdict == "named" and c.name in found.effects
+        coefficients = after.coefficients_of(c.name) if named_together else c.coefficients
         rows.append(
             {
                 "name": c.name,
                 "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in coefficients.items()},
                 "explained": e.explained(c),
                 "z": e.z(c),
+                "behind": c.rss - e.nearest.rss,
+                "objection": objection(e, c),
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "identifiability": c.surviving if c.visible else 0.0,
             }
         )
+    changed = found.verdict in ("named", "tied")
     return {
-        "verdict": first.decision.verdict,
-        "effects": list(named or first.decision.effects),
+        "verdict": found.verdict,
+        "effects": list(found.effects),
+        "further": list(found.further),
         "candidates": rows,
         "error": {
             "noise": work.fit.noise.sd,
             "before": before,
-            "after": later if named or first.decision.verdict == "tied" else before,
+            "after": later if changed else before,
             "unit": work.fit.noise.unit,
+            "held_out": held,
+            "fitted_before": fitted[0],
+            "fitted_after": fitted[1] if changed else fitted[0],
         },
+        "evidence": {
+            "misfit": e.rss_plain / e.count,
+            "misfit_after": after.rss / e.count,
+            "explained": e.explained(after),
+            "numerics": after.numerics / e.excess,
+        },
+        "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,
+        "budget_spent": work.spent,
         "seconds": seconds,
         "seed": study.config.study.seed,
     }

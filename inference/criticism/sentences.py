@@ -1,78 +1,167 @@
-"""A diagnosis in words."""
+"""A diagnosis in words: the verdict, what it rests on, where, what was ruled out and why, and how to be sure."""
 
 from typing import Any
 
-import numpy as np
-
 from ...core.effect import Effect
-from .verdict import EXPLAINS, Evidence
+from ...core.study import Study
+from .verdict import EXPLAINS
+
+#: Candidates that explain at least this share are told one by one.
+_WORTH_TELLING = 0.2
+#: A coefficient known to this part of its size needs no better experiment.
+_KNOWN = 0.1
 
 
-def explain(
-    result: dict[str, Any], effects: dict[str, type[Effect]], evidence: Evidence, together: float, held_out: int
-) -> list[str]:
-    """Paragraphs for people: the verdict first, then what it rests on and what could not be seen.
+def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]]) -> dict[str, str]:
+    """One paragraph for each question that a reader has; empty ones are left out.
 
     Args:
+        study: that was diagnosed.
         result: the JSON of the diagnosis.
         effects: classes by name.
-        evidence: of the first stage.
-        together: share of the excess misfit that everything named explains.
-        held_out: number of held-out recordings.
     """
-    error = result["error"]
-    where = "held-out error" if held_out else "error on the fitted recordings"
-    verdict, named = result["verdict"], result["effects"]
-    ratio = np.sqrt(evidence.rss_plain / evidence.count)
-    out: list[str] = []
+    parts = {
+        "verdict": _verdict(result, effects),
+        "further": _further(result),
+        "where": _where(result),
+        "alternatives": _alternatives(result),
+        "invisible": _invisible(result),
+        "to_be_sure": _to_be_sure(study, result),
+    }
+    return {key: text for key, text in parts.items() if text}
+
+
+def explain(result: dict[str, Any]) -> list[str]:
+    """Paragraphs for people, the verdict first."""
+    return list(result["told"].values())
+
+
+def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
+    error, verdict, named = result["error"], result["verdict"], result["effects"]
+    where = "held-out error" if error["held_out"] else "error on the fitted recordings"
+    fall = f"{where} {length(error['before'], error['unit'])} → {length(error['after'], error['unit'])}"
+    noise = f"noise {length(error['noise'], error['unit'])}"
+    ratio = result["evidence"]["misfit"] ** 0.5
+    rows = {c["name"]: c for c in result["candidates"]}
     if verdict == "named":
-        rows = [c for n in named for c in result["candidates"] if c["name"] == n]
-        out.append(
-            f"Missing: {' and '.join(named)}. The object {' and '.join(effects[n].symptom for n in named)}; "
-            f"{' and '.join(named)} {'explains' if len(named) == 1 else 'together explain'} "
-            f"{100 * together:.0f} % of the excess misfit, {'; '.join(_coefficients(c) for c in rows)}; {where} "
-            f"{length(error['before'], error['unit'])} → {length(error['after'], error['unit'])}, "
-            f"noise {length(error['noise'], error['unit'])}."
+        symptoms = " and ".join(effects[n].symptom for n in named)
+        together = " and ".join(named)
+        return (
+            f"Missing: {together}. The object {symptoms}; {together} "
+            f"{'explains' if len(named) == 1 else 'together explain'} {100 * result['evidence']['explained']:.0f} % of "
+            f"the excess misfit, {'; '.join(_coefficients(rows[n]) for n in named)}; {fall}, {noise}. Without it the "
+            f"model is {ratio:.1f} times the noise off on the fitted recordings, with it "
+            f"{result['evidence']['misfit_after'] ** 0.5:.2f} times."
         )
-    elif verdict == "tied":
-        out.append(
+    if verdict == "tied":
+        shares = "; ".join(
+            f"{n} {100 * rows[n]['explained']:.0f} % of the excess, with {_coefficients(rows[n])}" for n in named
+        )
+        return (
             f"Tied: {' and '.join(named)}. The object {effects[named[0]].symptom}; each explains the misfit about as "
-            f"well ({'; '.join(_share(result, n) for n in named)}), and these data cannot tell them apart. "
-            f"With {named[0]}, {where} {length(error['before'], error['unit'])} → "
-            f"{length(error['after'], error['unit'])}, noise {length(error['noise'], error['unit'])}. "
-            "A motion that excites them differently would decide: faster, at another frequency, or held still."
+            f"well ({shares}), and these data cannot tell them apart. With {named[0]}, {fall}, {noise}."
         )
-    elif verdict == "none":
+    if verdict == "none":
         best = result["candidates"][0]
-        out.append(
+        return (
             f"The model misses something, but none of the candidates is it: the misfit is {ratio:.1f} times the noise, "
-            f"and the best candidate, {best['name']}, explains {100 * best['explained']:.0f} % of the excess "
-            f"(at least {100 * EXPLAINS:.0f} % is asked, on motions it was not fitted to as well)."
+            f"and the best candidate, {best['name']}, explains {100 * best['explained']:.0f} % of the excess: "
+            f"{_reason(best, result)}."
         )
-    elif verdict == "no-misfit":
-        out.append(
+    if verdict == "no-misfit":
+        return (
             f"No misfit: the model differs from the measurement by {ratio:.2f} times the noise of "
             f"{length(error['noise'], error['unit'])}, which is what noise alone does."
         )
-    else:
-        out.append(
-            "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were "
-            "missing. Record a motion that excites the object more."
+    return (
+        "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were missing."
+    )
+
+
+def _further(result: dict[str, Any]) -> str:
+    further = result["further"]
+    if not further:
+        return ""
+    return (
+        f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(further)}; these data "
+        "cannot tell which."
+    )
+
+
+def _where(result: dict[str, Any]) -> str:
+    where = result["where"]
+    if where is None:
+        return ""
+    point = "" if where["point"] is None else f", most at point {where['point']}"
+    return (
+        f"Where: {100 * where['share']:.0f} % of the error that goes is in {where['recording']}, most of it from "
+        f"{where['from']:.2f} to {where['to']:.2f} s{point}."
+    )
+
+
+def _alternatives(result: dict[str, Any]) -> str:
+    verdict, named = result["verdict"], result["effects"]
+    about = named if named else [result["candidates"][0]["name"]]
+    if verdict in ("no-misfit", "cannot-tell"):
+        return ""
+    rivals = [c for c in result["candidates"] if c["name"] not in about]
+    near = [c for c in rivals if c["explained"] > _WORTH_TELLING]
+    if not near:
+        visible = [c for c in rivals if c["objection"] != "invisible"]
+        if not visible:
+            return ""
+        return f"Ruled out: all {len(visible)} others that these data can show; none explains a fifth of the misfit."
+    said = "; ".join(f"{c['name']} ({100 * c['explained']:.0f} %: {_reason(c, result)})" for c in near[:4])
+    rest = f"; and {len(near) - 4} more that explain less" if len(near) > 4 else ""
+    return f"Ruled out: {said}{rest}."
+
+
+def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
+    why = candidate["objection"]
+    if why == "chance":
+        return "no more than chance gives"
+    if why in ("zero", "invisible"):
+        return "its coefficients may as well be zero"
+    if why == "little":
+        return f"at least {100 * EXPLAINS:.0f} % is asked"
+    if why == "unaccounted":
+        return "what it leaves is neither noise nor what the numbers of the model make"
+    if why == "held-out":
+        return "motions that it was not fitted to get no better"
+    first = result["candidates"][0]["name"]
+    return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
+
+
+def _invisible(result: dict[str, Any]) -> str:
+    hidden = sorted(c["name"] for c in result["candidates"] if c["identifiability"] == 0.0)
+    return f"Not visible in these data, so neither ruled in nor out: {', '.join(hidden)}." if hidden else ""
+
+
+def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
+    verdict = result["verdict"]
+    if verdict == "tied":
+        return (
+            "To be sure: a motion that excites them differently decides, faster, at another frequency, or held still; "
+            f"muslin next {study.path} proposes one, and how sure you would be after it."
         )
-    told_already = named if verdict != "none" else [result["candidates"][0]["name"]]
-    rivals = [c for c in result["candidates"] if c["name"] not in told_already and c["explained"] > 0.2]
-    if verdict in ("named", "none") and rivals:
-        told = ", ".join(f"{c['name']} ({100 * c['explained']:.0f} %)" for c in rivals[:3])
-        out.append(f"Tried and less able: {told}.")
-    hidden = [c.name for c in evidence.candidates if not c.visible]
-    if hidden:
-        out.append(f"Not visible in these data, so neither ruled in nor out: {', '.join(sorted(hidden))}.")
-    return out
-
-
-def _share(result: dict[str, Any], name: str) -> str:
-    candidate = next(c for c in result["candidates"] if c["name"] == name)
-    return f"{name} {100 * candidate['explained']:.0f} % of the excess, with {_coefficients(candidate)}"
+    if verdict == "none":
+        return (
+            f"To learn more: muslin unknown {study.path} estimates the missing force itself, shows it on the object, "
+            "and looks for a law."
+        )
+    if verdict == "cannot-tell":
+        return f"To be sure: record a motion that excites the object more; muslin next {study.path} proposes one."
+    if verdict == "named":
+        rows = {c["name"]: c for c in result["candidates"]}
+        vague = [
+            f"{name} {k.replace('_', ' ')}"
+            for name in result["effects"]
+            for k, c in rows[name]["coefficients"].items()
+            if c["sd"] > _KNOWN * abs(c["mean"])
+        ]
+        if vague:
+            return f"Still vague: {', '.join(vague)} (known to no better than a tenth of its size)."
+    return ""
 
 
 def length(value: float, unit: str) -> str:

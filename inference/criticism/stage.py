@@ -1,194 +1,167 @@
-"""Every candidate beside the model so far: screened, polished, and what the evidence says."""
+"""Every candidate beside the model so far: looked at, screened, polished, and what the evidence says."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.parameters import ParameterSpace
-from ...core.rollout import Trajectory
-from ...core.study import Problem, SimulationPool, Study, Task
-from ..polish import Objective, Polished, polish
-from ..residuals import residual
-from ..sequential.fitting import offsets_of
-from ..sequential.result import FitResult
-from .candidate import (
-    Candidate,
-    best_starts,
-    effect_start,
-    newton_point,
-    responds,
-    root_mean_square,
-    screening_points,
-    unchanged,
-)
-from .verdict import Decision, Evidence, decide
+from ..polish import Polished, polish
+from .candidate import Candidate, best_starts, drop_z, screening_points
+from .linear import Look, least_square, look_at
+from .verdict import SIGNIFICANT, Decision, Evidence, decide, has_misfit
+from .work import Work
 
-#: Least-squares evaluations for every candidate, for the contenders on top, and for the most promising of these.
-FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, MORE_EVALUATIONS = 2, 4, 10
-#: Further starts from which what was named is polished.
-RESTARTS = 2
-#: How many go on after the first look, by what they reach and by what they promise: most are far behind at once.
-CONTENDERS = 4
+#: Least-squares evaluations for a candidate that passed the screening, for a contender on top, and to the end.
+FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 10
+#: Points of every candidate in the first screening, beside where a linear model would go.
+FEW_POINTS = 3
+#: How many candidates pass the screening, and the first polish: by what they reach, and as many by what they promise.
+SCREENED, CONTENDERS = 5, 3
 #: The candidates that are polished to the end: this many, and all that explain half of what the best does.
 FINALISTS = 2
+#: Further starts from which what was named is polished.
+RESTARTS = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """The model so far, its best fit, and every candidate beside it."""
+    """The model so far, its best fit, and every candidate beside it.
+
+    Args:
+        effects: that the model has already.
+        plain: its best fit.
+        looks: of all candidates.
+        evidence, decision: what they say.
+    """
 
     effects: tuple[str, ...]
     plain: Polished
+    looks: dict[str, Look]
     evidence: Evidence
     decision: Decision
 
+    def candidate(self, name: str) -> Candidate:
+        return next(c for c in self.evidence.candidates if c.name == name)
 
-def chosen_of(stage: Stage) -> Candidate:
-    """The candidate that the verdict puts first."""
-    return next(c for c in stage.evidence.candidates if c.name == stage.decision.effects[0])
+    @property
+    def chosen(self) -> Candidate:
+        """The candidate that the verdict puts first."""
+        return self.candidate(self.decision.effects[0])
 
 
-class Work:
-    """Everything that stages share."""
-
-    def __init__(self, study: Study, problem: Problem, pool: SimulationPool, fit: FitResult) -> None:
-        self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
-        self.offsets = offsets_of(study)
-        self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-
-    def space(self, effects: tuple[str, ...]) -> ParameterSpace:
-        return self.problem.with_effects(*effects).space
-
-    def objective(self, effects: tuple[str, ...]) -> Objective:
-        return Objective(self.pool, self.space(effects), self.problem.fit_on, self.fit.noise, self.offsets)
-
-    def stage(self, effects: tuple[str, ...], names: list[str], plain: Polished | FloatArray) -> Stage:
-        objective = self.objective(effects)
-        if not isinstance(plain, Polished):
-            plain = polish(objective, plain, 2)
-        candidates = []
-        for k, name in enumerate(names):
-            self.study.progress(f"trying {name}", k + 1, len(names))
-            candidates.append(self.refit((*effects, name), plain))
-        candidates = self.contend(effects, candidates)
-        candidates = self.finish(effects, candidates, plain)
+def run_stage(work: Work, effects: tuple[str, ...], names: list[str], start: FloatArray) -> Stage:
+    """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``."""
+    work.study.progress("refitting the model as it is", 0, 0)
+    work.see_numerics(effects, start)
+    plain = work.polished(effects, start, CONTENDER_EVALUATIONS)
+    looks = {}
+    for k, name in enumerate(names):
+        work.study.progress(f"looking at {name}", k + 1, len(names))
+        looks[name] = look_at(name, work.objective((*effects, name)), plain)
+    candidates = [_seen_only(look, plain) for look in looks.values()]
+    evidence = work.evidence(effects, plain, candidates)
+    if has_misfit(evidence) or any(_promises(look, plain, len(names)) for look in looks.values()):
+        tournament = _Tournament(work, effects, plain, looks)
+        candidates = tournament.run()
         best = min(candidates, key=lambda c: c.rss)
         if best.rss < plain.rss:
             # the plain model gets the best candidate's start too, or a better start would pass for an effect
-            again = polish(objective, best.fit.unit[: len(objective.space)], MORE_EVALUATIONS)
+            again = work.polished(effects, best.fit.unit[: len(plain.unit)], MORE_EVALUATIONS)
             plain = min(plain, again, key=lambda p: p.rss)
-        candidates = [replace(c, held_out=self.held_out(c.space, c.fit.unit)) for c in candidates]
-        evidence = Evidence(
-            rss_plain=plain.rss,
-            count=max(plain.count - len(objective.space), 1.0),
-            held_out_plain=root_mean_square(list(self.held_out(objective.space, plain.unit).values())),
-            noise_sd=self.fit.noise.sd,
-            noise_error=self.fit.noise.relative_error,
-            candidates=tuple(candidates),
-        )
-        stage = Stage(effects, plain, evidence, decide(evidence))
-        return self.again(stage) if stage.decision.verdict == "named" else stage
+        evidence = work.evidence(effects, plain, candidates)
+    stage = Stage(effects, plain, looks, evidence, decide(evidence))
+    return _again(work, stage) if stage.decision.verdict == "named" else stage
 
-    def refit(self, effects: tuple[str, ...], plain: Polished) -> Candidate:
-        objective = self.objective(effects)
-        base = len(plain.unit)
+
+def _seen_only(look: Look, plain: Polished) -> Candidate:
+    """A candidate that was looked at and no more."""
+    fit = look.as_fit(plain, look.start, plain.white)
+    return Candidate(look.name, look.space, look.base, fit, promised=look.rss)
+
+
+def _promises(look: Look, plain: Polished, tried: int) -> bool:
+    """Is what a linear model gains beyond chance? Without a misfit, effects are small, and linear models right."""
+    return drop_z(max(0.0, plain.rss - look.rss), len(look.space) - look.base, tried) >= SIGNIFICANT
+
+
+class _Tournament:
+    """Rollouts for those candidates that may win."""
+
+    def __init__(self, work: Work, effects: tuple[str, ...], plain: Polished, looks: dict[str, Look]) -> None:
+        self.work, self.effects, self.plain, self.looks = work, effects, plain, looks
+        self.points = work.study.config.diagnose.draws
+        seed = work.study.config.study.seed
         # own stream for every candidate, whatever the others are
-        rng = np.random.default_rng([self.study.config.study.seed, 47, *effects[-1].encode()])
-        starts = plain.unit[None]
-        if len(effects) == 1:
-            starts = np.vstack([starts, self.starts])
-        points = screening_points(objective.space, base, starts, self.study.config.diagnose.draws, rng)
-        start = effect_start(objective.space, base, plain.unit)
-        if not responds(objective, start, base):
-            still = np.zeros((len(plain.white), len(objective.space) - base))
-            return Candidate(effects[-1], objective.space, base, unchanged(plain, start, still))
-        points = np.vstack([start, points])
-        first = polish(objective, best_starts(objective, points)[0], FIRST_EVALUATIONS)
-        return Candidate(effects[-1], objective.space, base, first)
+        self.rng = {name: np.random.default_rng([seed, 47, *name.encode()]) for name in looks}
 
-    def contend(self, effects: tuple[str, ...], candidates: list[Candidate]) -> list[Candidate]:
-        """Polish those further that are best, or would be if residuals were linear; the others stay as they are."""
-        points = {c.name: newton_point(c.fit) for c in candidates}
-        by_promise = sorted(candidates, key=lambda c: points[c.name][1])
-        leaders = {c.name for c in [*sorted(candidates, key=lambda c: c.rss)[:CONTENDERS], *by_promise[:CONTENDERS]]}
-        out = []
-        for c in candidates:
-            if c.name in leaders:
-                self.study.progress(f"looking closer at {c.name}", 0, 0)
-                objective = self.objective((*effects, c.name))
-                start = best_starts(objective, np.stack([c.fit.unit, points[c.name][0]]))[0]
-                fit = polish(objective, start, CONTENDER_EVALUATIONS)
-                c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
-            out.append(c)
-        return out
-
-    def finish(self, effects: tuple[str, ...], candidates: list[Candidate], plain: Polished) -> list[Candidate]:
-        """Polish the promising candidates to the end; the others are far behind and stay as they are."""
-        order = sorted(candidates, key=lambda c: c.rss)
-        half = (plain.rss + order[0].rss) / 2
-        out = []
+    def run(self) -> list[Candidate]:
+        found = {name: _seen_only(look, self.plain) for name, look in self.looks.items()}
+        # the most promising first, in case the budget ends early
+        acting = sorted((n for n, look in self.looks.items() if look.responds), key=lambda n: self.looks[n].rss)
+        for k, name in enumerate(acting):
+            self.work.study.progress(f"screening {name}", k + 1, len(acting))
+            found[name] = self.screened(found[name], FEW_POINTS, self.looks[name].at)
+        promise = {name: self.looks[name].rss for name in acting}
+        for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
+            self.work.study.progress(f"trying {name}", 0, 0)
+            found[name] = self.polished(self.screened(found[name], self.points - FEW_POINTS), FIRST_EVALUATIONS)
+        tried = {n: found[n] for n in acting}
+        goals = {n: least_square(c.fit.unit, c.fit.white, c.fit.jacobian) for n, c in tried.items()}
+        for name in _leaders({n: c.rss for n, c in tried.items()}, {n: g[1] for n, g in goals.items()}, CONTENDERS):
+            self.work.study.progress(f"looking closer at {name}", 0, 0)
+            # steps of a bounded search from near a bound are short; this looks at what lies behind them
+            there = self.moved(found[name], goals[name][0][None])
+            found[name] = self.polished(there, CONTENDER_EVALUATIONS)
+        order = sorted(found.values(), key=lambda c: c.rank)
+        half = (self.plain.rss + order[0].rss) / 2
         for k, c in enumerate(order):
             if k < FINALISTS or c.rss < half:
-                self.study.progress(f"refitting {c.name}", 0, 0)
-                fit = polish(self.objective((*effects, c.name)), c.fit.unit, MORE_EVALUATIONS)
-                c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
-            out.append(c)
-        return out
+                self.work.study.progress(f"refitting {c.name}", 0, 0)
+                found[c.name] = self.polished(c, MORE_EVALUATIONS)
+        return [found[name] for name in self.looks]
 
-    def again(self, stage: Stage) -> Stage:
-        """Polish what was named from other starts too: what a fit in a side valley leaves is no second effect.
+    def screened(self, candidate: Candidate, count: int, at: FloatArray | None = None) -> Candidate:
+        """The best of the candidate and of points that fill its prior, or lie ``at (D,)``."""
+        base = len(self.plain.unit)
+        starts = self.plain.unit[None]
+        if not self.effects:
+            starts = np.vstack([starts, self.work.starts])
+        points = screening_points(candidate.space, base, starts, count, self.rng[candidate.name])
+        return self.moved(candidate, points if at is None else np.vstack([at, points]))
 
-        Only once the verdict stands: of all candidates the leader alone would have it easier than its rivals.
-        """
-        c = chosen_of(stage)
-        objective = self.objective((*stage.effects, c.name))
-        rng = np.random.default_rng([self.study.config.study.seed, 53, *c.name.encode()])
-        points = screening_points(c.space, c.base, c.fit.unit[None, : c.base], self.study.config.diagnose.draws, rng)
-        fits = [polish(objective, p, MORE_EVALUATIONS) for p in best_starts(objective, points)[:RESTARTS]]
-        better = replace(c, fit=min([c.fit, *fits], key=lambda p: p.rss))
-        better = replace(better, held_out=self.held_out(better.space, better.fit.unit))
-        candidates = tuple(better if other is c else other for other in stage.evidence.candidates)
-        return replace(stage, evidence=replace(stage.evidence, candidates=candidates))
+    def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
+        if self.work.spent:
+            return candidate
+        best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
+        if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
+            return candidate
+        return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]))
 
-    def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
-        values = space.as_dict(space.from_unit(unit))
-        names = self.problem.hold_out
-        out = {}
-        for name, outcome in zip(names, self.pool.map([Task(values, n) for n in names]), strict=True):
-            out[name] = (
-                residual(self.problem.recordings[name], outcome.series, self.fit.noise, self.offsets).rms
-                if isinstance(outcome, Trajectory)
-                else float("inf")
-            )
-        return out
+    def polished(self, candidate: Candidate, evaluations: int) -> Candidate:
+        fit = self.work.polished((*self.effects, candidate.name), candidate.fit.unit, evaluations)
+        return replace(candidate, fit=min(fit, candidate.fit, key=lambda p: p.rss))
 
-    def fitted_error(self, polished: Polished) -> float:
-        """Root mean square on the fitted recordings [unit]."""
-        return float(np.sqrt(polished.rss / polished.count) * self.fit.noise.sd)
 
-    def curves(self, first: Stage, after: Candidate) -> dict[str, dict[str, tuple[Any, list[str], str]]]:
-        """Error over time and shape, before and after, for the report."""
-        spaces = [(self.space(()), first.plain.unit), (after.space, after.fit.unit)]
-        names = [*self.problem.fit_on, *self.problem.hold_out]
-        tasks = [Task(s.as_dict(s.from_unit(u)), n) for n in names for s, u in spaces]
-        outcomes = list(self.pool.map(tasks))
-        out: dict[str, dict[str, tuple[Any, list[str], str]]] = {}
-        for k, name in enumerate(names):
-            recording = self.problem.recordings[name]
-            before, later = outcomes[2 * k], outcomes[2 * k + 1]
-            if not (isinstance(before, Trajectory) and isinstance(later, Trajectory)):
-                continue
-            unit = recording.series.unit
-            errors = [residual(recording, o.series, self.fit.noise, self.offsets).by_time for o in (before, later)]
-            out[name] = {
-                "time": (recording.series.time, ["time"], "s"),
-                "error_before": (errors[0], ["time"], unit),
-                "error_after": (errors[1], ["time"], unit),
-                "predicted_before": (before.series.points, ["time", "predicted_point", "axis"], unit),
-                "predicted_after": (later.series.points, ["time", "predicted_point", "axis"], unit),
-                "vertices_before": (before.vertices, ["time", "vertex", "axis"], "m"),
-                "vertices_after": (later.vertices, ["time", "vertex", "axis"], "m"),
-            }
-        return out
+def _leaders(reached: dict[str, float], promised: dict[str, float], count: int) -> list[str]:
+    """The names with the smallest numbers of either kind."""
+    leaders = {*sorted(reached, key=reached.__getitem__)[:count], *sorted(promised, key=promised.__getitem__)[:count]}
+    return [name for name in reached if name in leaders]
+
+
+def _again(work: Work, stage: Stage) -> Stage:
+    """Polish what was named from other starts too: what a fit in a side valley leaves is no second effect.
+
+    Only once the verdict stands: of all candidates the leader alone would have it easier than its rivals.
+    """
+    c = stage.chosen
+    if c.rss < stage.evidence.count * 1.02:
+        return stage  # nothing is left
+    effects = (*stage.effects, c.name)
+    rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
+    points = screening_points(c.space, c.base, c.fit.unit[None, : c.base], work.study.config.diagnose.draws, rng)
+    fits = [c.fit]
+    for unit, _ in best_starts(work.objective(effects), points)[:RESTARTS]:
+        fits.append(polish(work.objective(effects), unit, MORE_EVALUATIONS))
+    better = replace(c, fit=min(fits, key=lambda p: p.rss))
+    candidates = [better if other is c else other for other in stage.evidence.candidates]
+    return replace(stage, evidence=work.evidence(stage.effects, stage.plain, candidates))

@@ -12,6 +12,8 @@ Verdict = Literal["named", "tied", "none", "cannot-tell", "no-misfit"]
 
 #: An effect is named only if it explains at least this share of the excess misfit ...
 EXPLAINS = 0.5
+#: ... and what it leaves is noise, this share of the excess, or what the model's own numbers explain ...
+UNACCOUNTED = 0.2
 #: ... with at least this significance [standard deviations] ...
 SIGNIFICANT = 4.0
 #: ... and rivals are worse by more than this in -2 log likelihood (a Bayes factor of about 150) ...
@@ -35,6 +37,7 @@ class Evidence:
         count: degrees of freedom: independent residuals less parameters.
         held_out_plain: root mean square error on held-out recordings [unit]; NaN if there are none, infinite if
             they cannot be simulated.
+        held_out_white: mean square of the same, whitened by noise and numerics [noise variances].
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
         candidates: refitted.
@@ -43,14 +46,25 @@ class Evidence:
     rss_plain: float
     count: float
     held_out_plain: float
+    held_out_white: float
     noise_sd: float
     noise_error: float
     candidates: tuple[Candidate, ...]
 
     @property
+    def chance(self) -> float:
+        """What noise may leave beyond :attr:`count`: four standard deviations of its sum, and of its estimate two."""
+        return float(4.0 * np.sqrt(2.0 * self.count) + 4.0 * self.noise_error * self.count)
+
+    @property
     def floor(self) -> float:
-        """The residual sum of squares that the noise leaves, or the best candidate if that is less."""
-        return min([self.count, *(c.rss for c in self.candidates)])
+        """The residual sum of squares that noise may leave, or the best candidate if that is less."""
+        return min([self.count + self.chance, *(c.rss for c in self.candidates)])
+
+    @property
+    def nearest(self) -> Candidate:
+        """The candidate that leaves least."""
+        return min(self.candidates, key=lambda c: c.rank)
 
     @property
     def excess(self) -> float:
@@ -72,13 +86,20 @@ class Evidence:
 
         Where the plain model has no excess there to speak of, it must not rise.
         """
-        if np.isnan(self.held_out_plain):
+        if np.isnan(self.held_out_white):
             return True
-        before, after, noise = self.held_out_plain**2, self.held_out(candidate) ** 2, self.noise_sd**2
-        excess = before - noise
-        if excess < HELD_OUT_SLACK * noise:
-            return bool(after < before + HELD_OUT_SLACK * noise)
-        return bool(after < before - HELD_OUT_SHARE * excess)
+        before, after = self.held_out_white, candidate.held_out_white
+        if before - 1.0 < HELD_OUT_SLACK:
+            return bool(after < before + HELD_OUT_SLACK)
+        return bool(after < before - HELD_OUT_SHARE * (before - 1.0))
+
+    def left(self, candidate: Candidate) -> float:
+        """What a candidate leaves beyond what noise may [noise variances]."""
+        return max(0.0, candidate.rss - self.count - self.chance)
+
+    def accounted(self, candidate: Candidate) -> bool:
+        """Is what the candidate leaves small, or of a kind that the model's own numbers make?"""
+        return self.left(candidate) <= UNACCOUNTED * self.excess + candidate.numerics
 
 
 @dataclass(frozen=True)
@@ -95,22 +116,35 @@ def has_misfit(e: Evidence) -> bool:
     return bool(e.rss_plain / e.count > 1 + allowed)
 
 
+#: Why a candidate is not the answer: what was asked of it and not met, in the order in which it is asked.
+Objection = Literal["invisible", "chance", "zero", "little", "unaccounted", "held-out", "worse"]
+
+
+def objection(e: Evidence, candidate: Candidate) -> Objection | None:
+    """What speaks against a candidate by itself; None where nothing does."""
+    asked: tuple[tuple[Objection, bool], ...] = (
+        ("chance", e.z(candidate) >= SIGNIFICANT),
+        ("zero", _moved(candidate)),
+        ("little", e.explained(candidate) >= EXPLAINS),
+        ("unaccounted", e.accounted(candidate)),
+        ("held-out", e.better_held_out(candidate)),
+    )
+    failed = [name for name, met in asked if not met]
+    if failed and failed[0] in ("chance", "zero") and not candidate.visible:
+        return "invisible"
+    return failed[0] if failed else None
+
+
 def decide(e: Evidence) -> Decision:
     """The five verdicts, in the order in which they are ruled out."""
-    passing = [
-        c
-        for c in e.candidates
-        if e.z(c) >= SIGNIFICANT and e.explained(c) >= EXPLAINS and e.better_held_out(c) and _moved(c)
-    ]
-    passing.sort(key=lambda c: c.rss)
+    passing = sorted((c for c in e.candidates if objection(e, c) is None), key=lambda c: c.rank)
     if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
         seen = sum(c.visible for c in e.candidates)
         return Decision("no-misfit" if 2 * seen >= len(e.candidates) else "cannot-tell", ())
     if not passing:
         return Decision("none", ())
     best = passing[0]
-    left = max(0.0, best.rss - e.count)
-    rivals = [c for c in passing[1:] if c.rss - best.rss < MARGIN + SHARE_LEFT * left]
+    rivals = [c for c in passing[1:] if c.rss - best.rss < MARGIN + SHARE_LEFT * e.left(best)]
     if rivals:
         return Decision("tied", (best.name, *(c.name for c in rivals)))
     return Decision("named", (best.name,))

@@ -11,16 +11,24 @@ from muslin.core.errors import InputError
 from muslin.core.study import Study
 from muslin.inference.criticism.diagnose import Diagnosis
 from muslin.plugins.effects.air import AirDrag
+from muslin.plugins.effects.command import ActuatorLag
 
 pytest.importorskip("mujoco")
 
-SCHEMA = {"verdict", "effects", "candidates", "error", "simulations", "seconds", "seed"}
-CANDIDATE = {"name", "coefficients", "explained", "z", "held_out_before", "held_out_after", "identifiability"}
+SCHEMA = {
+    "verdict", "effects", "further", "candidates", "error", "evidence", "where", "told", "simulations", "budget_spent",
+    "seconds", "seed",
+}  # fmt: skip
+CANDIDATE = {
+    "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
+    "identifiability",
+}  # fmt: skip
+ERROR = {"noise", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
 
 
 def check_schema(result: dict[str, object]) -> None:
     assert set(result) == SCHEMA
-    assert set(result["error"]) == {"noise", "before", "after", "unit"}  # type: ignore[call-overload]
+    assert set(result["error"]) == ERROR  # type: ignore[call-overload]
     for c in result["candidates"]:  # type: ignore[attr-defined]
         assert set(c) == CANDIDATE
         assert all(set(v) == {"mean", "sd", "unit"} for v in c["coefficients"].values())
@@ -37,6 +45,10 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     check_schema(diagnosis.result)
     assert diagnosis.result["verdict"] == "named"
     assert diagnosis.result["effects"] == ["air-drag"]
+    assert next(iter(diagnosis.result["told"])) == "verdict"
+    assert "where" in diagnosis.result["told"]
+    assert diagnosis.result["candidates"][0]["objection"] is None
+    assert study.step_results("diagnose").attrs["models"][0]["effects"] == ["air-drag"]
     drag = diagnosis.result["candidates"][0]["coefficients"]["drag_coefficient"]
     assert abs(drag["mean"] - 1.2) < 4 * drag["sd"] + 0.02
     assert diagnosis.result["error"]["after"] < 0.5 * diagnosis.result["error"]["before"]
@@ -45,6 +57,29 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     rows = {r.recording: r for r in added.compare().rows}
     assert rows["other"].role == "held-out"
     assert rows["other"].rmse < 1.15 * rows["other"].noise
+
+
+@pytest.mark.slow
+def test_two_effects_at_once_are_both_named(tmp_path: Path) -> None:
+    hidden = (AirDrag(drag_coefficient=1.2), ActuatorLag(time_constant=0.05))
+    study = Study.load(write_study(tmp_path, small_measurement(*hidden)))
+    study.config.diagnose.candidates = ["air-drag", "actuator-lag", "gravity-tilt", "hem"]
+    study.fit()
+    result = study.diagnose().result
+    assert result["verdict"] == "named"
+    assert set(result["effects"]) == {"air-drag", "actuator-lag"}
+    assert result["error"]["after"] < 1.2 * result["error"]["noise"]
+
+
+@pytest.mark.slow
+def test_a_small_budget_still_gives_a_ranking(tmp_path: Path) -> None:
+    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))))
+    study.config.diagnose.simulations = 150
+    study.fit()
+    result = study.diagnose().result
+    assert result["candidates"][0]["name"] in ("air-drag", "viscous-damping")
+    assert result["simulations"] < 500
+    assert result["budget_spent"]
 
 
 @pytest.mark.slow

@@ -5,21 +5,28 @@ import pytest
 
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
-from muslin.inference.criticism.verdict import Decision, Evidence, decide
+from muslin.inference.criticism.verdict import Decision, Evidence, decide, objection
 from muslin.inference.polish import Polished
 
 COUNT = 3000.0
 
 
-def candidate(name: str, rss: float, held_out: float = 0.003, coefficient: float = 0.5, sd: float = 0.01) -> Candidate:
+def candidate(
+    name: str,
+    rss: float,
+    held_out: float = 0.003,
+    coefficient: float = 0.5,
+    sd: float = 0.01,
+    numerics: float = 0.0,
+) -> Candidate:
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
     white = np.full(int(COUNT), np.sqrt(rss / COUNT))
     fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, 1.0)
-    return Candidate(name, space, 1, fit, {"other": held_out})
+    return Candidate(name, space, 1, fit, {"other": held_out}, (held_out / 0.003) ** 2, numerics)
 
 
 def evidence(rss: float, *candidates: Candidate, held_out: float = 0.010) -> Evidence:
-    return Evidence(rss, COUNT, held_out, 0.003, 0.01, candidates)
+    return Evidence(rss, COUNT, held_out, (held_out / 0.003) ** 2, 0.003, 0.01, candidates)
 
 
 def test_named() -> None:
@@ -35,10 +42,20 @@ def test_tied_when_rivals_are_within_the_margin() -> None:
 
 def test_tied_when_the_difference_is_small_against_what_both_leave() -> None:
     """On data of another discretisation every difference is significant; the share left over says more."""
-    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT), candidate("damping", 2.3 * COUNT))
+    left = COUNT  # of both, as the model's own numbers may make it
+    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT, numerics=left), candidate("damping", 2.3 * COUNT))
     assert decide(e).verdict == "tied"
-    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT), candidate("damping", 2.8 * COUNT))
+    e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT, numerics=left), candidate("damping", 2.8 * COUNT))
     assert decide(e) == Decision("named", ("drag",))
+
+
+def test_not_named_when_much_is_left_that_neither_noise_nor_numerics_make() -> None:
+    """Another effect, one that is in no list, is half mimicked by one that is."""
+    half = candidate("wind", 3.5 * COUNT)
+    assert decide(evidence(9 * COUNT, half)).verdict == "none"
+    assert objection(evidence(9 * COUNT, half), half) == "unaccounted"
+    elsewhere = candidate("wind", 3.5 * COUNT, numerics=2.0 * COUNT)
+    assert decide(evidence(9 * COUNT, elsewhere)) == Decision("named", ("wind",))
 
 
 def test_none_when_nothing_explains_half() -> None:

@@ -1,0 +1,62 @@
+"""The same object on a mesh of half the spacing, to see how far a coarse one is from converged."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .body import Body
+from .scenario import Scenario
+
+
+def refined(scenario: Scenario) -> Scenario | None:
+    """Every edge of a cloth or rope halved; markers, grasps and loads stay where they are. None for other kinds.
+
+    A new vertex between two that the same gripper holds is held, too.
+    """
+    old = scenario.body
+    if old.kind not in ("cloth", "rope"):
+        return None
+    count, edges = len(old.vertices), old.edges
+    if old.kind == "rope":  # vertices are numbered along it
+        kept, middles = 2 * np.arange(count), 2 * np.arange(count - 1) + 1
+        chain = np.arange(2 * count - 2)
+        elements, warp, grid = np.stack([chain, chain + 1], axis=1), None, (2 * count - 1,)
+    else:
+        kept, middles = np.arange(count), count + np.arange(len(edges))
+        elements, warp, grid = _quartered(old, middles), _warp_of_parts(old.warp), None
+    vertices = np.empty((count + len(edges), 3))
+    vertices[kept], vertices[middles] = old.vertices, old.vertices[edges].mean(axis=1)
+    markers = np.zeros((len(scenario.markers), len(vertices)))
+    markers[:, kept] = scenario.markers
+    grasps = [np.concatenate([kept[ids], middles[np.isin(edges, ids).all(axis=1)]]) for ids in scenario.grasps]
+    return replace(
+        scenario,
+        body=replace(old, vertices=vertices, elements=elements, warp=warp, grid=grid),
+        grasps=tuple(grasps),
+        markers=markers,
+        load_vertices=kept[scenario.load_vertices],
+    )
+
+
+def _quartered(body: Body, middles: IntArray) -> IntArray:
+    """Four triangles ``(4 E, 3)`` for each, by the ``middles`` of the edges."""
+    of = {(int(a), int(b)): int(m) for (a, b), m in zip(body.edges, middles, strict=True)}
+    of |= {(b, a): m for (a, b), m in of.items()}
+    out = []
+    for a, b, c in body.elements.tolist():
+        ab, bc, ca = of[a, b], of[b, c], of[c, a]
+        out += [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.array(out, dtype=np.int64)
+
+
+def _warp_of_parts(warp: FloatArray | None) -> FloatArray | None:
+    """Shares ``(4 E, 2)`` of the edges of the four parts of every triangle that point as ``warp (E, 2)`` does.
+
+    Three parts are the triangle itself, half as large. In the middle one, with corners ab, bc and ca, the first edge
+    is (c - a) / 2 and the second (c - b) / 2.
+    """
+    if warp is None:
+        return None
+    inner = np.stack([warp[:, 0] + warp[:, 1], -warp[:, 0]], axis=1)
+    return np.asarray(np.stack([warp, warp, warp, inner], axis=1).reshape(-1, 2))

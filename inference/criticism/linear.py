@@ -1,0 +1,87 @@
+"""A first look at a candidate: what a linear model of the residuals promises, for one rollout a coefficient."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ...core.arrays import FloatArray
+from ...core.parameters import ParameterSpace
+from ..polish import Objective, Polished
+
+#: How far a coefficient is moved from zero [of its prior range]: far enough that effects with a threshold show.
+STEP = 0.1
+#: No solution is nearer to a face of the unit cube.
+_EDGE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One candidate at the plain fit.
+
+    Args:
+        name: of the effect.
+        space: parameters and coefficients.
+        start: the plain fit with every coefficient zero ``(D,)``.
+        jacobian: of the white residuals ``(N, D)``.
+        at: where the linear model of the residuals has its least square inside the cube ``(D,)``.
+        rss: that square [noise variances].
+    """
+
+    name: str
+    space: ParameterSpace
+    start: FloatArray
+    jacobian: FloatArray
+    at: FloatArray
+    rss: float
+
+    @property
+    def responds(self) -> bool:
+        """Does anything at all change? A lag of grippers that never move, say, cannot be seen."""
+        return bool(self.jacobian[:, self.base :].any())
+
+    @property
+    def base(self) -> int:
+        """Number of parameters that are not coefficients of this effect."""
+        return sum(not p.name.startswith(f"{self.name}.") for p in self.space)
+
+    def as_fit(self, plain: Polished, unit: FloatArray, white: FloatArray) -> Polished:
+        """A point ``unit (D,)`` with residuals ``white (N,)`` as a fit, with the curvature of this look."""
+        information = self.jacobian.T @ self.jacobian + 12.0 * np.eye(len(unit))
+        return Polished(unit, np.asarray(np.linalg.inv(information), float), self.jacobian, white, plain.information)
+
+
+def look_at(name: str, objective: Objective, plain: Polished) -> Look:
+    """Move every coefficient of ``name`` a little, the parameters staying at the plain fit.
+
+    Args:
+        name: of the effect.
+        objective: of the model with the effect.
+        plain: fit of the model without.
+    """
+    space, base = objective.space, len(plain.unit)
+    zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(space)[base:]])
+    start = np.concatenate([plain.unit, zero])
+    steps = np.where(zero + STEP <= 1.0, STEP, -STEP)
+    moved = np.repeat(start[None], len(zero), axis=0)
+    moved[np.arange(len(zero)), base + np.arange(len(zero))] += steps
+    columns = np.zeros((len(plain.white), len(zero)))
+    for k, row in enumerate(objective.many(moved)):
+        if row is not None:
+            columns[:, k] = (row - plain.white) / steps[k]
+    jacobian = np.hstack([plain.jacobian, columns])
+    at, rss = least_square(start, plain.white, jacobian)
+    return Look(name, space, start, jacobian, at, rss)
+
+
+def least_square(unit: FloatArray, white: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, float]:
+    """Where ``|white + jacobian (x - unit)|^2`` is least inside the unit cube ``(D,)``, and that square."""
+    q, r = np.linalg.qr(jacobian)
+    along = q.T @ white
+    across = float(white @ white - along @ along)
+    # the uniform prior of a unit interval, where the data say nothing
+    ridge = np.sqrt(12.0) * np.eye(len(unit))
+    low, high = np.minimum(_EDGE, unit) - unit, np.maximum(1.0 - _EDGE, unit) - unit
+    solved = lsq_linear(np.vstack([r, ridge]), np.concatenate([-along, np.zeros(len(unit))]), (low - 1e-9, high + 1e-9))
+    left = along + r @ solved.x
+    return np.clip(unit + solved.x, 0.0, 1.0), float(across + left @ left)

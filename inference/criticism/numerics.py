@@ -1,0 +1,96 @@
+"""How far the model's own numbers may be off: directions from a finer step, a finer mesh, and another engine."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.errors import MuslinError
+from ...core.powerless import why_powerless
+from ...core.refinement import refined
+from ...core.registry import REGISTRY
+from ...core.rollout import Trajectory
+from ...core.series import PointSeries
+from ...core.simulator import Simulator
+from ...core.study import Problem, SimulationPool, Task
+from ..discrepancy import Discrepancy
+from ..noise import Noise
+from ..residuals import Offsets, residual
+
+#: How much larger the whole error is than what a step or spacing of half the size takes away: first-order methods
+#: still have as much before them, second-order ones a third.
+_STEP, _MESH = 2.0, 4.0 / 3.0
+
+
+def numerical_discrepancy(
+    pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets
+) -> tuple[Discrepancy, int]:
+    """What the numbers of the pool's problem may be off by at ``values``, and the rollouts elsewhere that it took.
+
+    Each direction comes twice, constant and growing over the recording, as errors of a rollout do. Directions that
+    cannot be had (no other engine is there, or it cannot do this) are left out.
+    """
+    problem = pool.problem
+    names = (*problem.fit_on, *problem.hold_out)
+    used = [problem.effects[e] for e in {n.split(".", 1)[0] for n in values if "." in n}]
+    variants: list[tuple[Problem, float]] = []
+    finer = problem.simulator.finer()
+    if finer is not None:
+        variants.append((replace(problem, simulator=finer), _STEP))
+    meshes = {n: refined(problem.scenarios[n]) for n in names}
+    if all(s is not None for s in meshes.values()):
+        whole = {n: s for n, s in meshes.items() if s is not None}
+        variants.append((replace(problem, scenarios={**problem.scenarios, **whole}), _MESH))
+    for simulator in _others(problem.simulator):
+        scenario = problem.scenarios[names[0]]
+        if not any(why_powerless(effect, simulator, scenario) for effect in used):
+            variants.append((replace(problem, simulator=simulator), 1.0))
+    as_it_is = _predicted(pool, values, names)
+    columns: dict[str, list[FloatArray]] = {n: [] for n in names}
+    for variant, size in variants:
+        # a few rollouts: starting one more process would take longer
+        with SimulationPool(variant, min(1, pool.workers)) as elsewhere:
+            for name, other in _predicted(elsewhere, values, names).items():
+                if name in as_it_is:
+                    columns[name] += _columns(problem, name, as_it_is[name], other, size, noise, offsets)
+    found = {n: np.stack(c, axis=1) for n, c in columns.items() if c}
+    return Discrepancy(found), len(names) * len(variants)
+
+
+def _others(simulator: Simulator) -> list[Simulator]:
+    """Every other engine that is installed, with its own defaults."""
+    out = []
+    for name in REGISTRY.names("simulator"):
+        if name != simulator.name:
+            try:
+                made: Simulator = REGISTRY.get("simulator", name)()
+                made.engine_version()
+            except (MuslinError, ImportError, TypeError):
+                continue
+            out.append(made)
+    return out
+
+
+def _predicted(pool: SimulationPool, values: dict[str, float], names: tuple[str, ...]) -> dict[str, PointSeries]:
+    try:
+        outcomes = list(pool.map([Task(values, n) for n in names]))
+    except MuslinError:  # refused by the engine
+        return {}
+    return {n: o.series for n, o in zip(names, outcomes, strict=True) if isinstance(o, Trajectory)}
+
+
+def _columns(
+    problem: Problem, name: str, base: PointSeries, other: PointSeries, size: float, noise: Noise, offsets: Offsets
+) -> list[FloatArray]:
+    recording = problem.recordings[name]
+    if base.points.shape != other.points.shape:
+        return []
+    white = residual(recording, base, noise, offsets).white
+    later = np.linspace(0.0, 1.0, len(base.time))[:, None, None]
+    out = []
+    for share in (1.0, 2.0 * later - 1.0):
+        moved = replace(base, points=base.points + share * (other.points - base.points))
+        column = size * (residual(recording, moved, noise, offsets).white - white)
+        if np.isfinite(column).all():
+            out.append(column)
+    return out

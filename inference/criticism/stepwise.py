@@ -1,0 +1,108 @@
+"""One effect after the other: forward while something is left, in pairs where one alone is not enough, and back."""
+
+from dataclasses import dataclass, replace
+
+from ...core.arrays import FloatArray
+from .candidate import Candidate
+from .stage import MORE_EVALUATIONS, Stage, run_stage
+from .verdict import MARGIN, SHARE_LEFT, SIGNIFICANT, Verdict
+from .work import Work
+
+#: Effects that one diagnosis may name.
+MOST_EFFECTS = 3
+#: Where no effect alone is enough, pairs are tried with this many that explain at least this share of the misfit.
+LEADS, LEADING = 2, 0.2
+#: Share of the budget that the first stage may use.
+FIRST_SHARE = 2 / 3
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What all stages together say.
+
+    Args:
+        verdict: of them.
+        effects: that it is about, in the order in which they were found.
+        first: the first stage, with every candidate alone.
+        last: the stage that the verdict comes from.
+        after: the model with what was named; where nothing was, the candidate that came nearest.
+        further: effects beside the named ones of which one is missing, too, and which is not to be told.
+    """
+
+    verdict: Verdict
+    effects: tuple[str, ...]
+    first: Stage
+    last: Stage
+    after: Candidate
+    further: tuple[str, ...] = ()
+
+
+def find(work: Work, names: list[str], start: FloatArray) -> Findings:
+    """Find what is missing among candidates ``names``, the plain model's fit starting at ``start`` (unit cube)."""
+    total = work.limit
+    work.limit = int(FIRST_SHARE * total)
+    first = run_stage(work, (), names, start)
+    work.limit = total
+    verdict = first.decision.verdict
+    if verdict == "none":
+        return _pair(work, names, first) or Findings("none", (), first, first, _nearest(first))
+    if verdict == "tied":
+        return Findings("tied", first.decision.effects, first, first, first.chosen)
+    if verdict != "named":
+        return Findings(verdict, (), first, first, _nearest(first))
+    return _forward(work, names, Findings("named", first.decision.effects, first, first, first.chosen))
+
+
+def _forward(work: Work, names: list[str], found: Findings) -> Findings:
+    """Add effects as long as one is named; whether there is a misfit left to look into, each stage says itself."""
+    while len(found.effects) < MOST_EFFECTS and not work.spent:
+        rest = [n for n in names if n not in found.effects]
+        if not rest:
+            break
+        stage = run_stage(work, found.effects, rest, found.after.fit.unit)
+        if stage.decision.verdict == "tied":
+            return replace(found, further=stage.decision.effects)
+        if stage.decision.verdict != "named":
+            break
+        effects = (*found.effects, stage.chosen.name)
+        found = _without_idle(work, replace(found, effects=effects, last=stage, after=stage.chosen))
+        if len(found.effects) < len(effects):
+            break  # one was dropped again: from here it would go in circles
+    return found
+
+
+def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
+    """Two effects of like strength hide each other: with one of them in the model, is another one named?"""
+    e = first.evidence
+    leads = [c for c in sorted(e.candidates, key=lambda c: c.rank) if e.explained(c) > LEADING and e.z(c) > SIGNIFICANT]
+    for lead in leads[:LEADS]:
+        rest = [n for n in names if n != lead.name]
+        if work.spent or not rest:
+            return None
+        stage = run_stage(work, (lead.name,), rest, lead.fit.unit)
+        if stage.decision.verdict == "named" and e.accounted(stage.chosen):
+            pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
+            return _forward(work, names, _without_idle(work, pair))
+    return None
+
+
+def _without_idle(work: Work, found: Findings) -> Findings:
+    """Backward: drop an effect, named before the last one, that the others do without."""
+    best = found.after
+    left = found.last.evidence.left(best)
+    for name in found.effects[:-1]:
+        others = tuple(e for e in found.effects if e != name)
+        space = work.space(others)
+        values = best.space.as_dict(best.space.from_unit(best.fit.unit))
+        kept = [list(best.space.names).index(p.name) for p in space]
+        fit = work.polished(others, best.fit.unit[kept], MORE_EVALUATIONS)
+        if fit.rss - best.rss < MARGIN + SHARE_LEFT * left:
+            base = len(space) - sum(n.startswith(f"{others[-1]}.") for n in values)
+            after = replace(best, name=others[-1], space=space, base=base, fit=fit)
+            held, white = work.held_out(space, fit.unit)
+            return replace(found, effects=others, after=replace(after, held_out=held, held_out_white=white))
+    return found
+
+
+def _nearest(stage: Stage) -> Candidate:
+    return min(stage.evidence.candidates, key=lambda c: c.rank)

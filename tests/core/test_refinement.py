@@ -1,0 +1,42 @@
+"""A mesh of half the spacing is the same object."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from muslin.core.refinement import refined
+from muslin.core.scenario import marker_weights
+from muslin.core.scenarios import preset
+
+
+@pytest.mark.parametrize(("size", "counts"), [((0.3, 0.2), (5, 4)), ((0.8,), (9,))])
+def test_size_mass_markers_and_threads_stay(size: tuple[float, ...], counts: tuple[int, ...]) -> None:
+    coarse = preset("carry").scenario(size, counts)
+    count = len(coarse.body.vertices)
+    coarse = replace(coarse, markers=marker_weights(count, np.arange(count)[::2]))
+    fine = refined(coarse)
+    assert fine is not None
+    assert len(fine.body.vertices) == count + len(coarse.body.edges)
+    assert fine.body.measures.sum() == pytest.approx(coarse.body.measures.sum())
+    assert fine.body.edge_lengths(fine.body.vertices).max() == pytest.approx(
+        coarse.body.edge_lengths(coarse.body.vertices).max() / 2
+    )
+    np.testing.assert_allclose(fine.markers @ fine.body.vertices, coarse.markers @ coarse.body.vertices)
+    if coarse.body.kind == "cloth":
+        threads = np.repeat(coarse.body.warp_directions(coarse.body.vertices), 4, axis=0)
+        np.testing.assert_allclose(fine.body.warp_directions(fine.body.vertices), threads, atol=1e-12)
+
+
+def test_a_held_edge_stays_held_all_along() -> None:
+    coarse = preset("carry").scenario((0.3, 0.2), (5, 4))
+    fine = refined(coarse)
+    assert fine is not None
+    held = fine.body.vertices[fine.grasps[0]]
+    top = fine.body.vertices[fine.body.vertices[:, 2] > fine.body.vertices[:, 2].max() - 1e-9]
+    assert len(coarse.grasps[0]) == 5
+    assert len(held) == len(top) == 9
+
+
+def test_a_solid_is_not_refined() -> None:
+    assert refined(preset("beam").scenario()) is None
