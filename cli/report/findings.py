@@ -8,6 +8,7 @@ import zarr
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.study.study import Study
+from .compared import Compared
 
 Table = dict[str, Any]
 
@@ -27,6 +28,7 @@ class Take:
         point_before, point_after: error of each point over all time ``(P,)``.
         rmse_before, rmse_after: root mean square over all of it.
         correspondence: point p of the measurement is point p of the prediction.
+        compared: what else the comparison keeps of it.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Take:
     rmse_before: float | None = None
     rmse_after: float | None = None
     correspondence: bool = True
+    compared: Compared | None = None
 
     def without_after(self) -> "Take":
         return replace(self, after=None, predicted_after=None, vertices_after=None, point_after=None, rmse_after=None)

@@ -13,6 +13,7 @@ from ...core.measurement_store import read_hidden
 from ...core.store import read
 from ...core.study.objects import obstacles_of
 from ...core.study.study import Study
+from .compared import read_compared
 from .findings import Findings, Posterior, Table, Take, number
 from .outlines import outlines
 
@@ -117,7 +118,7 @@ def _takes(
             continue
         kept = _child(other, name) if other is not None else _child(diagnose, name)
         take = _take(name, dict(row), group, kept, other is not None, after_rows.get(name))
-        takes.append(replace(take, correspondence=paired.get(name, True)))
+        takes.append(replace(take, correspondence=paired.get(name, True), compared=read_compared(group)))
     return sorted(takes, key=lambda t: (not t.held_out, -t.rmse))
 
 

@@ -13,15 +13,20 @@ from ...core.study.study import Study
 from ...core.version import __version__
 from . import words
 from .calibration import calibration_section
+from .figures_adequacy import adequacy_figure
 from .figures_error import error_ceiling, error_figure
+from .figures_map import map_figure
 from .figures_object import object_figure
 from .figures_points import points_figure
 from .figures_posterior import axes_of, marginal_figure, pair_figure
+from .figures_sets import sets_figure
 from .findings import Findings, Posterior, Table, number
 from .gather import gather
 from .player import player_data
+from .predictive import predictive_data
 from .tables import candidate_rows, key_figures, parameter_rows, recording_rows
 from .verdict import thing, verdict
+from .where import group_rows
 
 #: So many recordings get a picture of the object; every one gets its error over time.
 _MOST_OBJECTS = 3
@@ -79,6 +84,8 @@ def context(found: Findings) -> Table:
         "best": words.sentence(best, errors["unit"], errors["noise"], thing(found)) if best else "",
         "pictures": pictures(found, name),
         "player": player_data(found),
+        "predictive": predictive_data(found),
+        "groups": group_rows(found),
         "calibration": calibration_section(found.calibration),
         "engine": engine(found),
         "hidden": found.hidden,
@@ -100,7 +107,7 @@ def compared(found: Findings) -> str:
         return ""
     last = (str(found.compare.get("text") or "").splitlines() or [""])[-1]
     p = number(found.compare.get("p_value"))
-    return last if p is None or "p =" in last else f"{last} (p\u00a0=\u00a0{words.value(p)})"
+    return last if p is None or "(p " in last else f"{last} (p\u00a0=\u00a0{words.value(p)})"
 
 
 def pictures(found: Findings, name: str) -> Table:
@@ -109,12 +116,17 @@ def pictures(found: Findings, name: str) -> Table:
     top = error_ceiling(found.takes) if found.takes else 1.0
     objects = [(t, object_figure(t, name)) for t in found.takes[:_MOST_OBJECTS]]
     points = [(t, points_figure(t, i)) for i, t in enumerate(found.takes[:_MOST_OBJECTS])]
+    maps = [(t, map_figure(t)) for t in found.takes[:_MOST_OBJECTS]]
+    sets = [(t, sets_figure(t)) for t in found.takes[:_MOST_OBJECTS]]
     return {
         "marginals": [marginal_figure(a, i) for i, a in enumerate(axes)],
         "pairs": pair_figure(axes),
         "errors": [(t, error_figure(t, top, i)) for i, t in enumerate(found.takes)],
         "objects": [(t, picture) for t, picture in objects if picture],
         "points": [(t, picture) for t, picture in points if picture],
+        "maps": [(t, picture) for t, picture in maps if picture],
+        "sets": [(t, picture) for t, picture in sets if picture],
+        "adequacy": adequacy_figure(found.compare),
     }
 
 

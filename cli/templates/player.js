@@ -1,11 +1,6 @@
-"use strict";
-for (const player of document.querySelectorAll(".player")) {
-  const film = JSON.parse(player.querySelector(".data").textContent);
-  const canvas = player.querySelector("canvas"), slider = player.querySelector("input");
-  const button = player.querySelector("button"), output = player.querySelector("output");
+for (const player of document.querySelectorAll(".player:not(.predictive)")) {
+  const film = JSON.parse(player.querySelector(".data").textContent), canvas = player.querySelector("canvas");
   const context = canvas.getContext("2d"), triangles = film.triangles, frames = film.time.length;
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  const shorts = (text) => new Int16Array(bytes(text).buffer);
   const measured = shorts(film.measured), points = measured.length / frames / 3;
   const models = film.models.map((m) => ({ title: m.title, rms: m.rms, vertices: shorts(m.vertices),
     predicted: m.predicted ? shorts(m.predicted) : null, heat: bytes(m.heat) }));
@@ -17,7 +12,7 @@ for (const player of document.querySelectorAll(".player")) {
     return "rgb(" + stops[k].map((a, c) => Math.round(a + f * (stops[k + 1][c] - a))).join() + ")";
   });
   const eye = film.view[2];
-  let azimuth = Math.atan2(eye[1], eye[0]), elevation = Math.asin(eye[2]), frame = film.worst, timer = 0;
+  let azimuth = Math.atan2(eye[1], eye[0]), elevation = Math.asin(eye[2]), frame = film.worst;
 
   function camera() {
     const ca = Math.cos(azimuth), sa = Math.sin(azimuth), ce = Math.cos(elevation), se = Math.sin(elevation);
@@ -105,17 +100,7 @@ for (const player of document.querySelectorAll(".player")) {
       context.fillText(model.title + ": points " + (off >= 10 ? off.toFixed(0) : off.toFixed(1)) + " " + film.unit + " away", width * (m + 0.5), 32);
       context.restore();
     });
-    slider.value = frame;
-    output.textContent = film.time[frame].toFixed(2) + " s";
   }
-  function stop() { clearTimeout(timer); timer = 0; button.textContent = "Play"; }
-  function next() {
-    const step = frame + 1 < frames ? 1000 * (film.time[frame + 1] - film.time[frame]) : 800;
-    timer = setTimeout(() => { frame = (frame + 1) % frames; draw(); next(); }, Math.max(16, step));
-  }
-  slider.max = frames - 1;
-  slider.addEventListener("input", () => { stop(); frame = Number(slider.value); draw(); });
-  button.addEventListener("click", () => { if (timer) { stop(); } else { button.textContent = "Pause"; next(); } });
   canvas.addEventListener("pointermove", (event) => {
     if (!event.buttons) return;
     azimuth -= event.movementX * 0.01;
@@ -123,6 +108,5 @@ for (const player of document.querySelectorAll(".player")) {
     draw();
   });
   canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
-  addEventListener("resize", draw);
-  draw();
+  playback(player, film, (k) => { frame = k; draw(); });
 }

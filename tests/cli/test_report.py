@@ -1,16 +1,22 @@
 """The report, at every stage a study can be in."""
 
+import base64
+import json
 import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made_up_study import ROLES, make_study
 
+from muslin.cli import steps
 from muslin.cli.report import overview_figure, write_report
+from muslin.cli.report.gather import gather
+from muslin.cli.report.predictive import predictive_data
 from muslin.cli.report.words import spread
-from muslin.core.errors import MuslinError, StepMissingError, StoreError
+from muslin.core.errors import MissingFileError, MuslinError, StepMissingError, StoreError
 from muslin.core.study.study import Study
 
 
@@ -73,9 +79,12 @@ def test_after_fit_only(tmp_path: Path) -> None:
 
 def test_after_compare(tmp_path: Path) -> None:
     page = page_of(make_study(tmp_path, "fit", "compare", hidden=False))
-    assert page.sections == ["object", "error", "recordings", "points", "fit", "provenance"]
-    assert page.figures["img"] == 3 and page.figures["canvas"] == 1
-    assert page.figures["svg"] == 3 + 3 + 3 + 1  # error, points, marginals, pairs
+    assert page.sections == [
+        "object", "predictive", "error", "recordings", "where", "points", "sets", "adequate", "fit", "provenance"
+    ]  # fmt: skip
+    assert page.figures["img"] == 3 + 3 + 3 and page.figures["canvas"] == 2  # objects, maps, sets
+    assert page.figures["svg"] == 3 + 3 + 1 + 3 + 1  # error, points, signs, marginals, pairs
+    assert "three quarters arises along the free edge" in page.text
     assert "does not explain the recordings" in page.text
     assert "muslin diagnose cloth.toml" in page.text
 
@@ -84,7 +93,8 @@ def test_after_everything(tmp_path: Path) -> None:
     study = make_study(tmp_path, "fit", "compare", "diagnose")
     page = page_of(study)
     assert page.sections == [
-        "object", "error", "recordings", "points", "candidates", "fit", "provenance", "hidden"
+        "object", "predictive", "error", "recordings", "where", "points", "sets", "adequate", "candidates", "fit",
+        "provenance", "hidden",
     ]  # fmt: skip
     assert re.search(
         r"Air drag is missing .* held-out error falls from \d+ mm to 3\.\d mm \(noise 3\.0 mm\)", page.text
@@ -119,7 +129,7 @@ def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))
     assert "air drag: drag coefficient" in page.text and "not in the model" in page.text
     assert "muslin add air-drag cloth.toml -o cloth-with-air-drag.toml" in page.text
-    assert page.figures["svg"] == 3 + 3 + 4 + 1
+    assert page.figures["svg"] == 3 + 3 + 1 + 4 + 1
     unfinished = make_study(tmp_path, "fit", drag=True)
     assert "is the refit of the diagnosis" in page_of(study, unfinished).text
 
@@ -149,12 +159,55 @@ def test_survives_lost_measurement_pixels_and_no_meshes(tmp_path: Path) -> None:
             del group[f"diagnose/{name}/{array}"]
     page = page_of(study)
     assert "hidden" not in page.sections
-    assert page.figures["canvas"] == 0 and page.figures["img"] == 3
+    assert page.figures["canvas"] == 1 and page.figures["img"] == 3 + 3 + 3
 
 
 def test_points_without_correspondence_are_not_paired(tmp_path: Path) -> None:
     page = page_of(make_study(tmp_path, "fit", "compare", correspondence=False))
-    assert "points" not in page.sections and page.figures["img"] == 3
+    assert "points" not in page.sections and page.figures["img"] == 3 + 3  # no map: its rows would mean nothing
+
+
+def test_what_an_older_comparison_kept_is_enough(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", hidden=False)
+    group = study.results("r+")["compare"]
+    for name in ROLES:
+        del group[f"{name}/witness"]  # type: ignore[attr-defined]
+    group.attrs.update(groups=[], signs=[])
+    page = page_of(study)
+    assert page.sections == ["object", "error", "recordings", "points", "fit", "provenance"]
+
+
+def test_the_film_of_predictions_is_small_and_whole(tmp_path: Path) -> None:
+    found = gather(make_study(tmp_path, "fit", "compare"))
+    film = predictive_data(found)
+    assert film is not None and film["draws"] == 8 and len(film["data"]) < 300_000
+    data = json.loads(film["data"])
+    frames, take = len(data["time"]), found.takes[0]
+    assert frames >= 12 and data["paired"]
+    assert take.measured is not None and take.compared is not None
+    packed = np.frombuffer(base64.b64decode(data["best"]), "<i2").reshape(frames, -1, 3).astype(float)
+    measured = np.frombuffer(base64.b64decode(data["measured"]), "<i2").reshape(frames, -1, 3)
+    assert (measured == -32768).any() == bool(np.isnan(take.measured).any())
+    shown = take.compared.predicted[np.searchsorted(take.time, np.array(data["time"]) - 1e-4)]
+    scale = np.ptp(shown[..., 2]) / np.ptp(packed[..., 2])
+    np.testing.assert_allclose(np.ptp(packed, axis=1) * scale, np.ptp(shown, axis=1), atol=1e-3)
+    assert len(data["draws"]) == 8 and max(data["lines"]) < packed.shape[1]
+
+
+def test_compare_writes_what_it_found_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Found:
+        def text(self) -> str:
+            return "in words"
+
+        def to_json(self) -> dict[str, object]:
+            return {"p_value": 0.2, "rows": [{"rmse": float("nan")}]}
+
+    study, out = make_study(tmp_path), tmp_path / "found.json"
+    monkeypatch.setattr(Study, "compare", lambda self: Found())
+    steps.compare(study.path, json_file=out)
+    assert json.loads(out.read_text()) == {"p_value": 0.2, "rows": [{"rmse": None}]}
+    with pytest.raises(MissingFileError, match="no folder"):
+        steps.compare(study.path, json_file=tmp_path / "no" / "found.json")
 
 
 def test_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

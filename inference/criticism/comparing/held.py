@@ -1,0 +1,106 @@
+"""One recording held against the best prediction of it, and the numbers that are compared."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+
+from ....core.arrays import BoolArray, FloatArray, IntArray
+from ....core.measurement import Recording
+from ....core.rollout import Trajectory
+from ....core.scenario import Scenario
+from ...residuals import Residual
+from .surface import surface_lattice
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A recording of T frames with P measured points, and its best prediction of Q points.
+
+    Args:
+        recording, scenario: what was measured, and how.
+        fitted: the parameters were fitted on it.
+        best: the prediction.
+        residual: measured minus predicted, offsets taken out.
+        draws: predictions of posterior draws ``(K, T, Q, A)`` [unit].
+    """
+
+    recording: Recording
+    scenario: Scenario
+    fitted: bool
+    best: Trajectory
+    residual: Residual
+    draws: FloatArray
+
+    @property
+    def name(self) -> str:
+        return self.recording.name
+
+    @property
+    def paired(self) -> bool:
+        """Point p of the measurement is point p of the prediction."""
+        return self.recording.series.correspondence
+
+    @cached_property
+    def seen(self) -> BoolArray:
+        """Which numbers were measured ``(T, P, A)``; as in :attr:`Residual.white`, in this order."""
+        return np.asarray(np.isfinite(self.residual.difference))
+
+    @cached_property
+    def partner(self) -> IntArray:
+        """The predicted point that each measured one is held against ``(T, P)``; 0 where none was seen."""
+        measured, model = self.recording.series.points, self.best.series.points
+        if self.paired:
+            return np.tile(np.arange(measured.shape[1]), (len(measured), 1))
+        out = np.zeros(measured.shape[:2], np.int64)
+        for t, seen in enumerate(self.recording.series.valid):
+            if seen.any():
+                out[t, seen] = cKDTree(model[t]).query(measured[t, seen])[1]
+        return out
+
+    @cached_property
+    def origin(self) -> FloatArray:
+        """Where each measured point came from if the prediction is right ``(T, P, A)`` [unit].
+
+        With correspondence the predicted point. Without, of named markers the predicted ones that lie nearest as a
+        whole, none taken twice; of points anywhere on the object the nearest place on its predicted surface.
+        """
+        measured, model = self.recording.series.points, self.best.series.points
+        if self.paired:
+            return model
+        out = np.full(measured.shape, np.nan)
+        lattice = surface_lattice(self.scenario, model)
+        for t, seen in enumerate(self.recording.series.valid):
+            if not seen.any():
+                continue
+            if lattice is not None:
+                places = lattice @ model[t]
+                out[t, seen] = places[cKDTree(places).query(measured[t, seen])[1]]
+            elif seen.sum() <= model.shape[1]:
+                gaps = ((measured[t, seen][:, None] - model[t][None]) ** 2).sum(axis=2)
+                out[t, seen] = model[t, linear_sum_assignment(gaps)[1]]
+            else:
+                out[t, seen] = model[t, self.partner[t, seen]]
+        return out
+
+    def under_noise(self, noise: FloatArray) -> FloatArray:
+        """What would be measured minus predicted had the best prediction been measured with this noise.
+
+        Args:
+            noise: ``(R, T, P, A)`` [unit].
+
+        Returns:
+            ``(R, T, P, A)`` [unit]. Points without correspondence look for their nearest one anew, which makes the
+            difference smaller than the noise.
+        """
+        if self.paired:
+            return noise
+        out = np.zeros_like(noise)
+        model, origin = self.best.series.points, self.origin
+        for t, seen in enumerate(self.recording.series.valid):
+            if seen.any():
+                made = origin[t, seen] + noise[:, t, seen]
+                out[:, t, seen] = made - model[t, cKDTree(model[t]).query(made)[1]]
+        return out

@@ -1,0 +1,110 @@
+"""What a comparison found: in a table, in words, and as JSON."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .adequacy import Adequacy
+from .excess import Group
+
+
+@dataclass(frozen=True)
+class Row:
+    """One recording. Errors are root mean squares over coordinates [unit].
+
+    Args:
+        recording, role: its name, and ``"fit"`` or ``"held-out"``.
+        rmse: of the best fit.
+        noise: of the measurement.
+        scatter: of predictions over posterior draws.
+        baseline: of the first measured shape, carried along by the gripper.
+        default: of the unfitted model, the middle of the prior.
+        worst_time: when the best fit is farthest off [s].
+        worst_point: which point is farthest off over all times.
+        unit: of the errors.
+        clock_offset: of the measurement, taken out [s].
+        sets_beyond: share of frames whose points, taken as a set, are not those of the prediction under noise.
+        sets_p_value: probability of sets so far apart in any frame under noise alone.
+        sets_worst_time: when they are farthest apart [s].
+    """
+
+    recording: str
+    role: str
+    rmse: float
+    noise: float
+    scatter: float
+    baseline: float
+    default: float
+    worst_time: float
+    worst_point: int
+    unit: str
+    clock_offset: float
+    sets_beyond: float
+    sets_p_value: float
+    sets_worst_time: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What :func:`~..compare.compare` found.
+
+    Args:
+        rows: a row a recording.
+        adequacy: the test of the fitted recordings.
+        groups: errors by recording, phase, contact, distance from the grasp, and place.
+        where: the same in a sentence.
+        sets: a sentence on points without correspondence; "" where all correspond.
+    """
+
+    rows: tuple[Row, ...]
+    adequacy: Adequacy
+    groups: tuple[Group, ...]
+    where: str
+    sets: str
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a misfit at least this large on the fitted recordings if model and noise were right."""
+        return self.adequacy.p_value
+
+    @property
+    def adequate(self) -> bool:
+        """The p value is not significant."""
+        return self.adequacy.adequate
+
+    def text(self) -> str:
+        """A table and a few sentences for people."""
+        unit, factor = ("mm", 1e3) if self.rows[0].unit == "m" else (self.rows[0].unit, 1.0)
+        wide = max(20, *(len(r.recording) for r in self.rows))
+        titles = "".join(f" {t:>{w}}" for t, w in (("error", 8), ("noise", 8), ("scatter", 8), ("baseline", 9)))
+        head = f"{'recording':<{wide}} {'role':<9}{titles} {'unfitted':>9}"
+        lines = [f"{head}  worst at   [{unit}, root mean square a coordinate]"]
+        for r in self.rows:
+            cells = "".join(
+                f" {factor * v:>{w}.2f}"
+                for v, w in ((r.rmse, 8), (r.noise, 8), (r.scatter, 8), (r.baseline, 9), (r.default, 9))
+            )
+            lines.append(f"{r.recording:<{wide}} {r.role:<9}{cells}  {r.worst_time:.2f} s, point {r.worst_point}")
+        return "\n".join([*lines, *(s for s in (self.where, self.sets, self.adequacy.text()) if s)])
+
+    def to_json(self) -> dict[str, Any]:
+        """Everything that was found, as plain values; lengths in the unit of the recordings."""
+        return {
+            "adequate": self.adequate,
+            "p_value": self.p_value,
+            "replicates": self.adequacy.replicates,
+            "limit": self.adequacy.limit,
+            "signs": [asdict(s) for s in self.adequacy.signs],
+            "where": self.where,
+            "sets": self.sets,
+            "groups": [asdict(g) for g in self.groups],
+            "rows": [asdict(r) for r in self.rows],
+        }
+
+
+def sets_sentence(rows: tuple[Row, ...]) -> str:
+    """What the recordings without correspondence show, taken as sets."""
+    off = [r for r in rows if r.sets_p_value <= 0.05]
+    if not off:
+        return "Taken as sets, the measured points are those of the prediction under noise, in every frame."
+    told = ", ".join(f"{100 * r.sets_beyond:.0f} % of {r.recording} (most at {r.sets_worst_time:.2f} s)" for r in off)
+    return f"Taken as sets, measured points differ from the prediction by more than noise in these frames: {told}."
