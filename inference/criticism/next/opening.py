@@ -1,0 +1,109 @@
+"""What a diagnosis left open, and the models that go with it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ....core.arrays import FloatArray
+from ....core.errors import InputError, StepMissingError
+from ....core.powerless import why_powerless
+from ....core.registry import REGISTRY
+from ....core.study import Problem, Study
+from ...noise import Noise
+from .goal import Purpose
+from .rivals import Rival, kept_rival, refitted_rival
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A question for the next experiment.
+
+    Args:
+        purpose: what is asked.
+        effects: that are tied, or were not seen.
+        beside: effects that were named, which every model has, too, where effects were not seen.
+        models: what the diagnosis kept of its models.
+        means: coefficients that the diagnosis found, ``effect.coefficient`` [units].
+        candidates: effects that it tried.
+        reason: why nothing is open.
+    """
+
+    purpose: Purpose
+    effects: tuple[str, ...] = ()
+    beside: tuple[str, ...] = ()
+    models: tuple[Mapping[str, Any], ...] = ()
+    means: Mapping[str, float] = field(default_factory=dict)
+    candidates: int = 1
+    reason: str = ""
+
+    @property
+    def all_effects(self) -> tuple[str, ...]:
+        return (*self.beside, *self.effects)
+
+
+def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
+    """What is open: what was asked for, else what was left tied, else what was not seen.
+
+    Raises:
+        StepMissingError: nothing was asked for, and the study has not been diagnosed.
+        InputError: an effect that was asked for is in the model already, cannot act here, or is named twice.
+    """
+    try:
+        attributes: dict[str, Any] = dict(study.step_results("diagnose").attrs)
+    except StepMissingError:
+        if not asked:
+            raise
+        attributes = {"result": {"verdict": "", "effects": [], "candidates": []}}
+    result = attributes["result"]
+    rows = result["candidates"]
+    models = tuple(attributes.get("models") or ())
+    means = {f"{r['name']}.{c}": float(v["mean"]) for r in rows for c, v in r["coefficients"].items()}
+    kept: dict[str, Any] = {"models": models, "means": means, "candidates": len(rows) or 1}
+    if asked:
+        _check(study, asked)
+        return Opening("tied" if len(asked) > 1 else "unseen", tuple(asked), **kept)
+    if result["verdict"] == "tied":
+        return Opening("tied", tuple(result["effects"]), **kept)
+    hidden = [r["name"] for r in rows if not r.get("visible", r["identifiability"] > 0)]
+    if hidden:
+        return Opening("unseen", tuple(hidden), tuple(result["effects"]), **kept)
+    told = " and ".join(result["effects"])
+    reason = (
+        f"{told} is named, and no other candidate would have been hidden"
+        if told
+        else ("no effects are tied, and these data show every candidate")
+    )
+    return Opening("nothing", reason=reason, **kept)
+
+
+def tied_rivals(
+    study: Study, problem: Problem, noise: Noise, plain: FloatArray, opening: Opening
+) -> tuple[list[Rival], int]:
+    """The models with each of the tied effects, and the rollouts that refitting them took.
+
+    They are compared by how well they fit, so either all are taken from the diagnosis, or none.
+    """
+    kept = [r for r in (kept_rival(problem, (n,), opening.models) for n in opening.effects) if r is not None]
+    if len(kept) == len(opening.effects):
+        return kept, 0
+    out = []
+    with study.pool(problem) as pool:
+        for k, name in enumerate(opening.effects):
+            study.progress(f"refitting {name}", k + 1, len(opening.effects))
+            out.append(refitted_rival(study, problem, pool, noise, name, plain, opening.means))
+        count = pool.count
+    return out, count
+
+
+def _check(study: Study, asked: Sequence[str]) -> None:
+    problem = study.problem
+    for name in asked:
+        effect = REGISTRY.get("effect", name)
+        if name in study.config.effects:
+            raise InputError(f"{name!r} is in the model of {study.path} already, so it is not in question")
+        reason = why_powerless(effect, problem.simulator, problem.scenarios[problem.fit_on[0]])
+        if reason is not None:
+            raise InputError(reason)
+    twice = sorted({n for n in asked if list(asked).count(n) > 1})
+    if twice:
+        raise InputError(f"{twice[0]!r} is named twice; name different effects")

@@ -1,0 +1,178 @@
+"""The next experiment, on a rope that is simulated in milliseconds: what is proposed separates what was tied."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("scipy")
+pytest.importorskip("torch")
+
+from next_world import (
+    NOISE,
+    STIFFNESS,
+    Fragile,
+    LinearDrag,
+    put_diagnosis,
+    register,
+    rope_study,
+)
+
+from muslin.core.errors import InputError, StepMissingError
+from muslin.core.store import read
+from muslin.core.study import Study
+from muslin.inference.criticism.next import opening
+from muslin.inference.criticism.next.rivals import knowing
+from muslin.inference.criticism.next.step import NextExperiment, propose_next
+from muslin.inference.sequential.result import load_fit
+
+FEW = 60
+
+
+@pytest.fixture(autouse=True)
+def world(monkeypatch: pytest.MonkeyPatch) -> None:
+    register(monkeypatch)
+
+
+def kept(study: Study, effect: str, value: float, span: float, rss: float = 300.0) -> dict[str, object]:
+    """A model as the diagnosis keeps it."""
+    unit = [*study.problem.space.to_unit(np.array([STIFFNESS])).tolist(), value / span]
+    name = {"linear-drag": "rate", "twin-drag": "rate", "quadratic-drag": "factor"}[effect]
+    values = {"stretch_stiffness": STIFFNESS, f"{effect}.{name}": value}
+    return {"effects": [effect], "values": values, "unit": unit, "covariance": [[4e-4, 0], [0, 1e-3]], "rss": rss}
+
+
+def tied_drags(study: Study, lead: float = 0.0) -> None:
+    models = [kept(study, "linear-drag", 1.0, 5.0), kept(study, "quadratic-drag", 6.0, 20.0, 300.0 + lead)]
+    put_diagnosis(study, "tied", ["linear-drag", "quadratic-drag"], models=models)
+
+
+def propose(study: Study, **options: object) -> NextExperiment:
+    return propose_next(study, **{"simulations": FEW, **options})  # type: ignore[arg-type]
+
+
+def test_tied_drags_are_told_apart_by_a_motion_within_the_limits(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, LinearDrag(rate=1.0))
+    tied_drags(study)
+    found = propose(study, max_speed=1.0, max_acceleration=10.0, workspace=(-0.2, 0.2) * 3, duration=1.2)
+    result = found.to_json()
+    assert result["purpose"] == "tied" and result["effects"] == ["linear-drag", "quadratic-drag"]
+    assert result["tells"] and result["probability"] > 0.9 > 0.5 > result["repeat"]["probability"]
+    assert found.motion is not None
+    assert result["motion"]["peak_speed"] <= 1.0 and result["motion"]["peak_acceleration"] <= 10.0
+    assert FEW * 0.6 < result["simulations"] < FEW * 1.3
+    text = found.text()
+    assert text.startswith("Tied now: linear-drag, quadratic-drag.") and "would be named with probability" in text
+    group = study.step_results("next")
+    np.testing.assert_array_equal(read(group, "gripper_pose"), found.motion.poses)  # type: ignore[arg-type]
+    assert group.attrs["result"]["probability"] == result["probability"]  # type: ignore[index,call-overload]
+
+
+def test_nothing_tells_twins_apart_and_that_is_said(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, LinearDrag(rate=1.0))
+    models = [kept(study, "linear-drag", 1.0, 5.0), kept(study, "twin-drag", 1.0, 5.0)]
+    put_diagnosis(study, "tied", ["linear-drag", "twin-drag"], models=models)
+    found = propose(study, simulations=36, max_speed=2.0, max_acceleration=20.0)
+    assert found.motion is None and found.result["probability"] < 0.01 and found.result["takes"] is None
+    assert "No motion within these limits would tell them apart: best less than 1 %" in found.text()
+    with pytest.raises(InputError, match="nothing to write"):
+        found.write(tmp_path / "motion.csv")
+    assert not (tmp_path / "motion.csv").exists()
+
+
+@pytest.mark.slow
+def test_models_are_refitted_where_the_diagnosis_kept_none(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, LinearDrag(rate=1.0))
+    found = propose(study, effects=("linear-drag", "quadratic-drag"), max_speed=1.0, workspace=(-0.2, 0.2) * 3)
+    assert found.result["purpose"] == "tied" and found.result["probability"] > found.result["repeat"]["probability"]
+    put_diagnosis(study, "tied", ["linear-drag", "quadratic-drag"])
+    rivals, count = opening.tied_rivals(
+        study,
+        knowing(study.problem, {"linear-drag": LinearDrag}),
+        load_fit(study).noise,
+        read(study.step_results("fit"), "estimate_unit"),
+        opening.Opening("tied", ("linear-drag",)),
+    )
+    assert count > 0 and rivals[0].values()["linear-drag.rate"] == pytest.approx(1.0, abs=0.25)
+
+
+def propose_noise(study: Study):  # type: ignore[no-untyped-def]
+    from muslin.inference.sequential.result import load_fit
+
+    return load_fit(study).noise
+
+
+def test_kept_models_are_used_and_none_refitted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = rope_study(tmp_path)
+    tied_drags(study)
+    monkeypatch.setattr(opening, "refitted_rival", lambda *_: pytest.fail("refitted"))
+    assert propose(study, simulations=30).result["simulations"] <= 45
+
+
+def test_what_the_recordings_decide_needs_no_motion(tmp_path: Path) -> None:
+    study = rope_study(tmp_path)
+    tied_drags(study, lead=25.0)
+    found = propose(study)
+    assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0 and found.motion is None
+    assert "linear-drag fits better than quadratic-drag, by 25" in found.text()
+
+
+def test_nothing_open_is_said_without_a_simulation(tmp_path: Path) -> None:
+    study = rope_study(tmp_path)
+    put_diagnosis(study, "named", ["linear-drag"])
+    found = propose(study)
+    assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0
+    assert found.text().startswith("Nothing is open: linear-drag is named")
+
+
+def test_what_was_not_seen_is_shown_by_a_livelier_motion(tmp_path: Path) -> None:
+    study = rope_study(tmp_path)
+    put_diagnosis(study, "cannot-tell", [], hidden=["quadratic-drag", "actuator-lag"])
+    found = propose(study, max_speed=1.5, max_acceleration=15.0, workspace=(-0.2, 0.2) * 3, duration=1.2)
+    assert found.result["purpose"] == "unseen" and found.motion is not None
+    assert min(found.result["probabilities"].values()) > 0.9
+    assert "Not visible in these data: quadratic-drag, actuator-lag." in found.text()
+    still = propose(study, simulations=30, max_speed=0.01, max_acceleration=0.1, duration=1.2)
+    assert still.result["probabilities"]["actuator-lag"] < 0.05
+
+
+def test_motions_that_tear_the_object_are_avoided(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, simulator="fragile")
+    tied_drags(study)
+    found = propose(study, simulations=40, max_speed=1.0, max_acceleration=10.0)
+    assert found.result["failed"] > 0
+    assert found.result["motion"]["peak_speed"] <= Fragile.strength * 1.02  # the command is sampled more finely
+
+
+def test_the_same_seed_proposes_the_same_motion(tmp_path: Path) -> None:
+    study = rope_study(tmp_path)
+    tied_drags(study)
+    first, second = propose(study, simulations=30), propose(study, simulations=30)
+    assert {**first.result, "seconds": 0} == {**second.result, "seconds": 0}
+
+
+def test_bad_questions_are_answered_in_one_line(tmp_path: Path) -> None:
+    study = rope_study(tmp_path)
+    with pytest.raises(StepMissingError, match="muslin diagnose"):
+        propose(study)
+    with pytest.raises(InputError, match="named twice"):
+        propose(study, effects=("linear-drag", "linear-drag"))
+    with pytest.raises(InputError, match="at least 30"):
+        propose(study, effects=("linear-drag", "twin-drag"), simulations=3)
+    with pytest.raises(InputError, match="cloth and solid"):
+        propose(study, effects=("linear-drag", "air-drag"))
+
+
+@pytest.mark.slow
+def test_noise_hides(tmp_path: Path) -> None:
+    quiet, loud = rope_study(_folder(tmp_path / "a")), rope_study(_folder(tmp_path / "b"), noise=60 * NOISE)
+    shares = []
+    for study in (quiet, loud):
+        tied_drags(study)
+        shares.append(propose(study, max_speed=1.0, max_acceleration=10.0).result["probability"])
+    assert shares[0] > shares[1] + 0.3
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
