@@ -14,6 +14,7 @@ from muslin.core.rollout import rollout
 from muslin.core.testing import check_effect
 from muslin.core.testing.samples import sample_material, sample_scenario
 from muslin.plugins.effects.damping import ViscousDamping
+from muslin.plugins.effects.law import Law
 from muslin.plugins.effects.surface import plate_force
 
 ALL = "cloth rope solid"
@@ -43,6 +44,7 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "hem": ("mass", "on_loads", "cloth", {"line_mass": "kg/m"}),
     "internal-damping": ("material", "on_material", ALL, {"damping_time": "s"}),
     "rope-hysteresis": ("force", "bind", "rope", {"friction_moment": "N m"}),
+    "law": ("force", "bind", ALL, {c.name: c.unit for c in Law.coefficients}),
     "stick-slip": ("contact", "bind", ALL, {"excess": "1"}),
     "strain-stiffening": ("material", "bind_stiffness", "cloth rope", {"stiffening": "1"}),
     "table-tilt": ("contact", "on_obstacles", ALL, {"about_x": "rad", "about_y": "rad"}),

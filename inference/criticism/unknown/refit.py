@@ -1,0 +1,148 @@
+"""A guessed law as an effect in the model: refitted together with the parameters, and held out."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ....core.arrays import FloatArray
+from ....core.parameters import Parameter, ParameterSpace
+from ....core.rollout import Trajectory
+from ....core.study import Problem, SimulationPool, Task
+from ...noise import Noise
+from ...polish import Objective, Polished, polish
+from ...residuals import Offsets, residual
+from .estimate import ForceObjective
+from .held import HeldObjective
+from .search import Guess
+
+#: Name of the effect.
+LAW = "law"
+#: Least-squares evaluations for every guess, and for those that lead.
+FIRST_EVALUATIONS, MORE_EVALUATIONS = 4, 10
+#: Coefficients nearer to zero than this are dropped [standard deviations].
+CLEAR = 3.0
+#: Most coefficients hold for any size; this one only says where others act, and is not dropped for being small.
+_PLACES = ("frequency",)
+
+
+@dataclass(frozen=True, eq=False)
+class RefittedLaw:
+    """The model with a law.
+
+    Args:
+        name: what it is made of.
+        space: parameters and coefficients.
+        base: number of the parameters that are not coefficients of the law.
+        fit: polished together, in units of the noise.
+        held_out: root mean square error on each held-out recording [unit].
+    """
+
+    name: str
+    space: ParameterSpace
+    base: int
+    fit: Polished
+    held_out: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def rss(self) -> float:
+        return self.fit.rss
+
+    @property
+    def coefficients(self) -> tuple[str, ...]:
+        """Names of the terms."""
+        return tuple(n.removeprefix(f"{LAW}.") for n in self.space.names[self.base :])
+
+    @property
+    def terms(self) -> dict[str, tuple[float, float, str]]:
+        """Mean, standard deviation and unit of every coefficient; misfit that is left makes it less certain."""
+        own = list(self.space)[self.base :]
+        mean = self.space.from_unit(self.fit.unit)[self.base :]
+        sd = np.sqrt(np.diag(self.fit.covariance)[self.base :] * max(1.0, self.rss / self.fit.count))
+        return {
+            p.name.removeprefix(f"{LAW}."): (float(m), float(s * (p.high - p.low)), p.unit)
+            for p, m, s in zip(own, mean, sd, strict=True)
+        }
+
+
+def distinct(laws: list[RefittedLaw]) -> list[RefittedLaw]:
+    """One law of each set of coefficients, the one of least residual."""
+    out: dict[frozenset[str], RefittedLaw] = {}
+    for law in sorted(laws, key=lambda c: c.rss):
+        out.setdefault(frozenset(law.terms), law)
+    return list(out.values())
+
+
+class Refits:
+    """Refits laws beside one another.
+
+    Args:
+        pool: whose problem has the effect ``law``.
+        problem: the study's, without it.
+        noise, offsets: of the measurement.
+        parameters: of the effect, by coefficient.
+    """
+
+    def __init__(
+        self, pool: SimulationPool, problem: Problem, noise: Noise, offsets: Offsets, parameters: dict[str, Parameter]
+    ) -> None:
+        self.pool, self.problem, self.noise, self.offsets = pool, problem, noise, offsets
+        self.parameters = parameters
+
+    def objective(self, coefficients: tuple[str, ...]) -> Objective:
+        extra = tuple(self.parameters[c] for c in coefficients)
+        space = self.problem.space + ParameterSpace(extra)
+        return Objective(self.pool, space, self.problem.fit_on, self.noise, self.offsets)
+
+    def first(self, guess: Guess, unit: FloatArray, force: ForceObjective) -> RefittedLaw:
+        """The law polished on a held model from where the search left it; ``unit`` are the parameters there."""
+        names = tuple(guess.coefficients)
+        objective = HeldObjective(force, self.objective(names).space)
+        base = len(self.problem.space)
+        told = np.array(list(guess.coefficients.values()))
+        sized = np.array([n not in _PLACES for n in names])
+        starts = []
+        for shift, share in ((1.0, 1.0), (0.0, 1.0), (0.0, 0.5)):
+            values = np.where(sized, share, 1.0) * told
+            theta = ParameterSpace(tuple(objective.space)[base:]).to_unit(values)
+            starts.append(np.clip(np.concatenate([unit + shift * guess.shift, theta]), 0.01, 0.99))
+        sizes = [np.inf if w is None else float(w @ w) for w in objective.many(np.stack(starts))]
+        fit = polish(objective, starts[int(np.argmin(sizes))], FIRST_EVALUATIONS)
+        return RefittedLaw(" + ".join(guess.pieces), objective.space, base, fit)
+
+    def more(self, law: RefittedLaw) -> RefittedLaw:
+        """Polished to the end, without coefficients that are not clearly off zero."""
+        law = self._polished(law)
+        while len(law.space) - law.base > 1:
+            faint = self._faintest(law)
+            if faint is None:
+                break
+            kept = [k for k in range(len(law.space)) if k != faint]
+            space = ParameterSpace(tuple(p for k, p in enumerate(law.space) if k != faint))
+            law = self._polished(RefittedLaw(law.name, space, law.base, replace(law.fit, unit=law.fit.unit[kept])))
+        return replace(law, held_out=self.held_out(law.space, law.fit.unit))
+
+    def _polished(self, law: RefittedLaw) -> RefittedLaw:
+        objective = self.objective(law.coefficients)
+        fit = polish(objective, law.fit.unit, MORE_EVALUATIONS)
+        return replace(law, space=objective.space, fit=fit)
+
+    def _faintest(self, law: RefittedLaw) -> int | None:
+        """Number, in the space, of the coefficient that is least off zero, if it is not clearly so."""
+        clear = {n: abs(mean) / max(sd, 1e-300) for n, (mean, sd, _) in law.terms.items() if n not in _PLACES}
+        name = min(clear, key=clear.__getitem__)
+        if clear[name] >= CLEAR or len(clear) == 1:
+            return None
+        return law.space.names.index(f"{LAW}.{name}")
+
+    def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
+        """Root mean square error on every held-out recording [unit]; infinite where it cannot be simulated."""
+        values, names = space.as_dict(space.from_unit(unit)), self.problem.hold_out
+        out = {}
+        for name, made in zip(names, self.pool.map([Task(values, n) for n in names]), strict=True):
+            recording = self.problem.recordings[name]
+            out[name] = (
+                residual(recording, made.series, self.noise, self.offsets).rms
+                if isinstance(made, Trajectory)
+                else float("inf")
+            )
+        return out
