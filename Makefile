@@ -8,8 +8,8 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
-.PHONY: demo test lint bench bench-calibration bench-hidden-small bench-inference bench-material bench-paper bench-proposals bench-sets \
-	bench-sim clean
+.PHONY: demo test lint bench bench-calibration bench-effects bench-hidden-small bench-inference bench-material bench-paper \
+	bench-proposals bench-sets bench-sim clean
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -45,6 +45,10 @@ lint: $(VENV)/.ready-dev
 	cd build/types && MYPYPATH=. "$(CURDIR)/$(BIN)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p muslin
 
 bench: bench-calibration bench-hidden-small bench-inference bench-material bench-proposals bench-sets bench-sim
+
+# needs an hour or more; EFFECTS="--part test --cases 400 --minutes 2000" for the whole
+bench-effects: $(VENV)/.ready-bench
+	$(BIN)/python tests/benchmarks/effects.py $(EFFECTS)
 
 bench-hidden-small: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/hidden_small.py

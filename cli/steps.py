@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import InputError
+from ..core.registry import REGISTRY
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
 from .output import check_output, write_json
@@ -39,11 +40,22 @@ def fit(study: StudyFile, workers: Workers = None) -> None:
     next_step(command("compare", study))
 
 
-def compare(study: StudyFile, workers: Workers = None) -> None:
-    """Hold the fitted simulator against every recording: how large the error is, where, and when."""
+def compare(
+    study: StudyFile,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write what was found to this JSON file, too.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Hold the fitted simulator against every recording: how large the error is, where, when, and is it noise?"""
+    if json_file is not None:
+        check_output(json_file, force=True)
     with ProgressView() as progress:
         result = Study.load(study, workers=workers, progress=progress).compare()
     say(result.text())
+    if json_file is not None:
+        write_json(json_file, result.to_json())
+        say(f"wrote {json_file}")
     next_step(command("diagnose", study), command("report", study))
 
 
@@ -71,33 +83,57 @@ def diagnose(
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:
         output = study.with_name(f"{study.stem}-with-{effects[0]}.toml")
-        next_step(command("add", effects[0], study, "-o", output), command("report", study))
+        further = [command("next", study)] if verdict.get("verdict") == "tied" else []
+        next_step(command("add", effects[0], study, "-o", output), *further, command("report", study))
     else:
-        next_step(command("report", study))
+        further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])
+        next_step(*(command(step, study) for step in further), command("report", study))
 
 
 def add(
-    effect: Annotated[str, typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them.")],
-    study: StudyFile,
+    effect: Annotated[
+        str, typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them. None with --law.")
+    ],
+    study: Annotated[
+        Path | None, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
             "-o", "--output", metavar="STUDY2.toml", help="The new study file; default STUDY-with-EFFECT.toml."
         ),
     ] = None,
+    law: Annotated[
+        Path | None, typer.Option("--law", metavar="FILE", help="Add the law of a file of muslin unknown --json.")
+    ] = None,
     force: Force = False,
 ) -> None:
     """Write a study of the same model with one more effect, its coefficients inferred from the recordings."""
-    loaded = Study.load(study)
-    target = output or study.with_name(f"{study.stem}-with-{effect}.toml")
-    if target.resolve() == study.resolve():
+    if law is not None and study is not None:
+        raise InputError(f"name either the effect {effect!r} or a law, not both: muslin add --law FILE STUDY.toml")
+    if law is None and study is None:
+        raise InputError(f"name an effect and a study, or a law file and a study; got {effect!r} alone")
+    if law is None and not REGISTRY.get("effect", effect).candidate:
+        raise InputError(
+            f"{effect!r} stands for a law that muslin unknown has found: muslin unknown {study} --json law.json, then "
+            f"muslin add --law law.json {study}"
+        )
+    source, what = (Path(effect), f"the law of {law}") if study is None else (study, effect)
+    name = effect if law is None else "law"
+    target = output or source.with_name(f"{source.stem}-with-{name}.toml")
+    if target.resolve() == source.resolve():
         raise InputError(f"{target} is the study itself; name another file with -o")
     check_output(target, force)
-    made = loaded.add(effect, target, overwrite=force)
-    say(f"wrote {made.path}: the model of {study} with {effect}")
+    loaded = Study.load(source)
+    made = (
+        loaded.add(effect, target, overwrite=force)
+        if law is None
+        else REGISTRY.get("step", "add-law")(loaded, law, target, overwrite=force)
+    )
+    say(f"wrote {made.path}: the model of {source} with {what}")
     next_step(
         f"{command('fit', made.path)} && {command('compare', made.path)} && "
-        f"{command('report', study, '--after', made.path)}"
+        f"{command('report', source, '--after', made.path)}"
     )
 
 
