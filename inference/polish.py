@@ -17,6 +17,11 @@ from .residuals import Offsets, failed, residual
 
 #: Finite-difference step in the unit cube: small against the prior, large against rounding in a rollout.
 STEP = 2e-3
+#: Least squares starts from another place while it leaves this times what noise leaves, this often at most, from
+#: starts at least so far apart in some coordinate of the unit cube.
+MISFIT, STARTS, APART = 1.5, 4, 0.1
+#: Evaluations from each of these before they are given up.
+FEW_EVALUATIONS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,3 +153,22 @@ def polish(objective: Objective, start: FloatArray, evaluations: int = 12) -> Po
     return Polished(
         np.asarray(result.x, float), np.linalg.inv(information), jacobian, white, objective.noise.information
     )
+
+
+def polish_from(objective: Objective, starts: FloatArray) -> Polished:
+    """The best of least squares from the first of ``starts (N, D)``, and while it leaves a misfit, from others.
+
+    An object that may fall one way or another (a rope on a table, a fold) has valleys that no descent leaves. The
+    others are the next that are not near one that was tried.
+    """
+    tried = [starts[0]]
+    best = polish(objective, starts[0])
+    for start in starts[1:]:
+        if best.rss < MISFIT * best.count or len(tried) == STARTS:
+            break
+        if min(np.abs(start - t).max() for t in tried) > APART:
+            tried.append(start)
+            other = polish(objective, start, FEW_EVALUATIONS)
+            if other.rss < best.rss:
+                best = min(other, polish(objective, other.unit), key=lambda p: p.rss)
+    return best

@@ -108,7 +108,7 @@ class Findings:
         after_name: what "after" has that "before" has not, or "" if there is no after.
         after_inferred: "after" comes from a whole fit of its own, not from the diagnosis.
         hidden: label of a generated measurement.
-        calibration: results of that step, or None.
+        calibration, unknown, proposed: results of the steps ``calibrate``, ``unknown`` and ``next``, or None.
     """
 
     study: Study
@@ -123,6 +123,8 @@ class Findings:
     after: Study | None = None
     hidden: Table | None = None
     calibration: zarr.Group | None = None
+    unknown: zarr.Group | None = None
+    proposed: zarr.Group | None = None
 
     @property
     def after_label(self) -> str:

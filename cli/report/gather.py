@@ -51,6 +51,8 @@ def gather(study: Study, after: Study | None = None) -> Findings:
         after=after,
         hidden=_hidden(study),
         calibration=_step(study, "calibrate"),
+        unknown=_step(study, "unknown"),
+        proposed=_step(study, "next"),
     )
 
 

@@ -21,6 +21,7 @@ from .figures_points import points_figure
 from .figures_posterior import axes_of, marginal_figure, pair_figure
 from .figures_sets import sets_figure
 from .findings import Findings, Posterior, Table, number
+from .further import further_sections
 from .gather import gather
 from .player import player_data
 from .predictive import predictive_data
@@ -87,6 +88,7 @@ def context(found: Findings) -> Table:
         "predictive": predictive_data(found),
         "groups": group_rows(found),
         "calibration": calibration_section(found.calibration),
+        "further": further_sections(found),
         "engine": engine(found),
         "hidden": found.hidden,
         "provenance": provenance(found),

@@ -12,7 +12,7 @@ from ...core.store import storage_errors
 from ...core.study import SimulationPool, Study, Task
 from ..noise import Noise, estimate_noise
 from ..observe import Observer
-from ..polish import Objective, polish
+from ..polish import Objective, polish_from
 from ..residuals import Offsets, residual
 from .bounds import at_bounds, bound_notes
 from .doubts import doubts
@@ -69,7 +69,7 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
         study.progress("polishing the best draw by least squares", 0, 0)
         objective = Objective(pool, space, problem.fit_on, noise, offsets_of(study))
         before = pool.count
-        best = polish(objective, _best_draw(study, store, noise, takes, upto))
+        best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto))
         found = doubts(pool, space, best.unit, problem.fit_on[0], noise)
         simulations = upto * len(takes.simulated) + pool.count - before
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
@@ -119,7 +119,8 @@ def _simulate(study: Study, pool: SimulationPool, store: DrawStore, proposal: Fl
         study.progress(title, count - len(missing) + done + 1, count)
 
 
-def _best_draw(study: Study, store: DrawStore, noise: Noise, takes: Takes, upto: int) -> FloatArray:
+def _draws_in_order(study: Study, store: DrawStore, noise: Noise, takes: Takes, upto: int) -> FloatArray:
+    """Whole draws ``(N, D)`` in the unit cube, the one that comes nearest to the measurement first."""
     problem = study.problem
     theta, points, _ = store.read(upto)
     total = np.zeros(len(theta))
@@ -129,7 +130,7 @@ def _best_draw(study: Study, store: DrawStore, noise: Noise, takes: Takes, upto:
             series = PointSeries(recording.series.time, p, recording.series.unit, recording.series.correspondence)
             white = residual(recording, series, noise, offsets_of(study)).white
             total[k] += float(white @ white)
-    return np.asarray(theta[int(np.argmin(total))])
+    return np.asarray(theta[np.argsort(total, kind="stable")])
 
 
 def _too_many_failed(store: DrawStore, space: ParameterSpace) -> MuslinError:

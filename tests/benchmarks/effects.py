@@ -43,7 +43,7 @@ def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=list(FIRST_SEEDS), default="development", help="which seeds")
     parser.add_argument("--cases", type=int, default=100, help="how many (default: 100)")
-    parser.add_argument("--minutes", type=float, default=60.0, help="start no further case after (default: 60)")
+    parser.add_argument("--minutes", type=float, default=60.0, help="start no case after (default: 60)")
     parser.add_argument("--settings", nargs="*", choices=list(SETTINGS), default=list(SETTINGS), help="these alone")
     parser.add_argument("--kinds", nargs="*", choices=list(BLOCK), default=list(BLOCK), help="of truth, these alone")
     parser.add_argument("--baselines", nargs="*", choices=list(BASELINES), default=list(BASELINES), metavar="NAME")
@@ -110,7 +110,7 @@ def main() -> None:
         record = kept.get(case)
         if record is None:
             if time.monotonic() - began > 60 * a.minutes:
-                break
+                continue  # later ones may be finished
             record = run_case(case, how, cache)
             kept.add(case, record)
         records.append(record)

@@ -5,7 +5,7 @@ import numpy as np
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.noise import Noise
-from muslin.inference.polish import Objective, polish
+from muslin.inference.polish import Objective, polish, polish_from
 from muslin.inference.residuals import Offsets
 
 
@@ -27,6 +27,25 @@ def test_the_minimum_and_its_covariance() -> None:
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
     matrix = Linear(2.0).matrix
     np.testing.assert_allclose(best.covariance, np.linalg.inv(matrix.T @ matrix + 12 * np.eye(2)), rtol=1e-6)
+
+
+class TwoValleys(Linear):
+    """A linear problem that looks like another, which nothing fits, where the first parameter is above a half."""
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        wrong = self.matrix @ np.array([0.3, 0.3])
+        return [
+            wrong + self.matrix @ (u - np.array([0.8, 0.2])) if u[0] > 0.5 else self.matrix @ (u - np.array([0.4, 0.7]))
+            for u in units
+        ]
+
+
+def test_another_start_is_tried_where_the_first_leaves_a_misfit() -> None:
+    starts = np.array([[0.9, 0.3], [0.88, 0.31], [0.2, 0.2], [0.1, 0.9]])
+    stuck = polish(TwoValleys(2.0), starts[0])
+    assert stuck.rss > 1.5 * stuck.count
+    best = polish_from(TwoValleys(2.0), starts)
+    np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
 
 
 def test_a_neighbour_that_fails_does_not_pass_for_certainty() -> None:

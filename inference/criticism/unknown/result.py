@@ -95,6 +95,10 @@ def _force_table(estimate: Estimate, problem: Problem) -> dict[str, Any]:
     }
 
 
+#: A held-out error above this many times the noise is more than noise.
+_NOISE_ONLY = 1.15
+
+
 def law_text(result: dict[str, Any]) -> tuple[str, ...]:
     """Paragraphs for people."""
     if result["verdict"] == "no-misfit":
@@ -128,6 +132,11 @@ def law_text(result: dict[str, Any]) -> tuple[str, ...]:
             f"Held-out error {scale * error['held_out_before']:.2f} -> {scale * error['held_out_after']:.2f} {unit}, "
             f"noise {scale * error['noise']:.2f} {unit}."
         )
+        if error["held_out_after"] > _NOISE_ONLY * error["noise"]:
+            lines.append(
+                "What it leaves there is more than noise: it predicts, but take its terms as a description, not as the "
+                "law itself."
+            )
     lines += [f"These recordings cannot tell it from: {a['pieces']} ({_shares(a)})." for a in result["alternatives"]]
     return tuple(lines)
 
