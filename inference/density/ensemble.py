@@ -48,14 +48,13 @@ class _Scored(nn.Module):
         return self.network.log_prob(inputs, z)
 
 
-def left_out(draws: int, members: int, share: float, repeats: int, generator: torch.Generator) -> Tensor:
-    """``(repeats * members, draws)`` bool: in every repeat disjoint sets, one a member, of ``share`` of the draws."""
+def left_out(draws: int, members: int, share: float, generator: torch.Generator) -> Tensor:
+    """``(members, draws)`` bool: disjoint sets, one a member, of ``share`` of the draws at most."""
     size = max(1, int(draws * min(share, 1.0 / members)))
-    held = torch.zeros(repeats * members, draws, dtype=torch.bool)
-    for repeat in torch.split(held, members):
-        order = torch.randperm(draws, generator=generator)
-        for k, row in enumerate(repeat):
-            row[order[k * size : (k + 1) * size]] = True
+    order = torch.randperm(draws, generator=generator)
+    held = torch.zeros(members, draws, dtype=torch.bool)
+    for k in range(members):
+        held[k, order[k * size : (k + 1) * size]] = True
     return held
 
 
@@ -74,9 +73,9 @@ def train_ensemble(
     What starts best stays as it started: the state before the first step counts.
 
     Args:
-        members: E networks of one shape.
-        inputs: tensors whose first two axes are the members and the draws: each member may read what another does not.
-        z: ``(E, N, D)`` targets.
+        members: networks of one shape.
+        inputs: tensors whose first axis is the draws.
+        z: ``(N, D)`` targets.
         weights: ``(N,)``.
         held: ``(E, N)`` of :func:`left_out`: as many for every member.
         schedule: how.
@@ -84,7 +83,7 @@ def train_ensemble(
         device: where.
 
     Returns:
-        ``(E, N)`` log density of every draw under the members that left it out; NaN under the others.
+        ``(N,)`` log density of every draw under the member that left it out; NaN where none did.
     """
     stack = _Stack(members, [t.to(device) for t in inputs], z.to(device), device)
     kept = torch.stack([torch.nonzero(~h).flatten() for h in held])
@@ -120,8 +119,8 @@ def train_ensemble(
         if waited >= schedule.patience:
             break
     stack.restore(state)
-    scores = torch.full(held.shape, torch.nan)
-    scores.scatter_(1, test.cpu(), stack.score(test).cpu())
+    scores = torch.full((len(z),), torch.nan)
+    scores[test] = stack.score(test).cpu()
     for k, member in enumerate(members):
         stack.write(k, member)
     return scores
@@ -133,7 +132,7 @@ def _rate(part: float) -> float:
 
 
 class _Stack:
-    """The members' parameters and inputs with a leading axis."""
+    """The members' parameters with a leading axis, and the inputs they share."""
 
     def __init__(
         self, members: Sequence[DensityNetwork], inputs: list[Tensor], z: Tensor, device: torch.device
@@ -153,8 +152,7 @@ class _Stack:
 
     def log_prob(self, rows: Tensor) -> Tensor:
         """``(E, B)`` log densities of draws ``rows (E, B)``."""
-        member = torch.arange(len(rows), device=self.z.device)[:, None]
-        return self.call(self.named, self.buffers, self.z[member, rows], *[t[member, rows] for t in self.inputs])
+        return self.call(self.named, self.buffers, self.z[rows], *[t[rows] for t in self.inputs])
 
     def score(self, rows: Tensor) -> Tensor:
         with torch.no_grad():

@@ -1,40 +1,25 @@
-"""Several small networks on summaries, each with all that it reads made without the draws that it leaves out."""
+"""Several small networks on the same features, each stopped early on draws that it leaves out."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from ..posterior.mixture import MixturePosterior
-from .draws import Draws
-from .head import Head, MeanHead
-from .mixture_head import MixtureHead
+from .head import MeanHead
+from .mixture_head import MixtureHead, mixture_log_prob
 from .networks import SummaryNetwork
 from .training import train
-from .widths import TAIL_WIDTH, LeftOut, fitted_width
 
-# With fewer draws than this, each is left out by two networks.
-_FEW = 500
-
-
-class Summary(Protocol):
-    """What networks read: features and first guesses ``(N, D)``; :class:`~..embedding.summaries.Summaries` is one.
-
-    Attributes:
-        training: of the draws it was made from; residual: ``(D,)`` error of their guesses.
-    """
-
-    training: tuple[Tensor, Tensor]
-    residual: Tensor
-
-    def __call__(self, known: list[Tensor], /) -> tuple[Tensor, Tensor]: ...
-
-
-#: From what is known of some draws, and these.
-Summarise = Callable[[list[Tensor], Draws], Summary]
+# Part of the mass in a copy of the mixture this much wider, so that the few draws in its tail do not widen it all.
+_TAILS = (0.001, 0.01, 0.03, 0.06, 0.1, 0.2)
+_TAIL_WIDTH = 3.0
+# Factors on all standard deviations, of which the one that suits the left-out draws best is taken.
+_WIDENINGS = (0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.35, 1.5, 1.75, 2.0, 2.5, 3.0)
 
 
 @dataclass(frozen=True)
@@ -43,8 +28,7 @@ class Plan:
 
     Args:
         hidden: widths of the fully connected layers.
-        members: networks; with one, a fifth of the draws is left out. Twice as many with few draws, each of which
-            two of them leave out: what these say together is nearer to what all say of a measurement.
+        members: networks; with one, a fifth of the draws is left out.
         learning_rate, weight_decay, batch, max_epochs, patience: of :func:`~.training.train`. Patience 0 trains one
             network for all epochs on all draws.
     """
@@ -57,98 +41,40 @@ class Plan:
     max_epochs: int
     patience: int
 
-    def held(self, draws: int, generator: torch.Generator) -> list[Tensor]:
-        """Which draws each network leaves out, bool ``(N,)``."""
-        if not self.patience:
-            return [torch.zeros(draws, dtype=torch.bool)]
-        parts = 5 if self.members == 1 else self.members
-        repeats = 2 if self.members > 1 and draws < _FEW else 1
-        folds = [torch.randperm(draws, generator=generator) % parts for _ in range(repeats)]
-        return [fold == k for fold in folds for k in range(self.members)]
-
-
-@dataclass(frozen=True, eq=False)
-class Member:
-    """A network and what it reads.
-
-    Args:
-        summary: made without the draws left out.
-        network: trained without them.
-        held: ``(n,)`` their numbers.
-        inputs: features and first guesses of them.
-    """
-
-    summary: Summary
-    network: SummaryNetwork
-    held: Tensor
-    inputs: tuple[Tensor, Tensor]
-
-
-class OnCube:
-    """A summary whose first guesses are on the unit cube.
-
-    Args:
-        summary: in probit coordinates; draws: that it was made from.
-    """
-
-    def __init__(self, summary: Summary, draws: Draws) -> None:
-        self.summary = summary
-        features, guess = summary.training
-        self.training = features, torch.special.ndtr(guess)
-        error = (draws.weights[:, None] * (draws.unit - self.training[1]) ** 2).sum(0) / draws.weights.sum()
-        self.residual = error.sqrt().clamp(min=1e-3)
-
-    def __call__(self, known: list[Tensor]) -> tuple[Tensor, Tensor]:
-        features, guess = self.summary(known)
-        return features, torch.special.ndtr(guess)
-
 
 def cross_fit(
-    head: Callable[[Summary], Head],
-    summarise: Summarise,
-    known: list[Tensor],
-    draws: Draws,
+    make: Callable[[], SummaryNetwork],
+    inputs: list[Tensor],
     target: Tensor,
+    weights: Tensor,
     plan: Plan,
     generator: torch.Generator,
-) -> list[Member]:
-    """Networks, each trained with summaries of its own, which know nothing of the draws that it leaves out.
-
-    Left-out draws then meet what a measurement meets: were regressions made from all draws, these would be nearer to
-    the draws left out than to any measurement, and widths found on them too small.
-
-    Args:
-        head: of a network on a summary.
-        summarise: makes the summary.
-        known: ``(N, ...)``, what is known of every draw.
-        draws, target: their weights, and ``(N, D)`` what networks learn.
-        plan, generator: how.
-    """
-    weights, trained = draws.weights.float(), []
-    for held in plan.held(len(target), generator):
-        summary = summarise([t[~held] for t in known], draws.among(~held))
-        left = [t.float() for t in summary([t[held] for t in known])]
-        inputs = []
-        for seen, new in zip(summary.training, left, strict=True):
-            rows = torch.zeros(len(target), seen.shape[1])
-            rows[~held], rows[held] = seen.float(), new
-            inputs.append(rows)
-        network = SummaryNetwork(inputs[0].shape[1], plan.hidden, head(summary))
+) -> list[tuple[SummaryNetwork, Tensor]]:
+    """Networks, and the draws ``(n,)`` that each left out (none when patience is 0)."""
+    members = plan.members if plan.patience else 1
+    fold = torch.randperm(len(target), generator=generator) % max(members, 5 if plan.patience else 1)
+    trained = []
+    for k in range(members):
+        network = make()
+        held = fold == k if plan.patience else torch.zeros(len(target), dtype=torch.bool)
         train(
-            network, inputs, target.float(), weights, held, generator,
+            network, inputs, target, weights, held, generator,
             learning_rate=plan.learning_rate, weight_decay=plan.weight_decay, batch=plan.batch,
             max_epochs=plan.max_epochs, patience=plan.patience,
         )  # fmt: skip
-        trained.append(Member(summary, network, torch.nonzero(held).flatten(), (left[0], left[1])))
+        trained.append((network, torch.nonzero(held).flatten()))
     return trained
 
 
 class MixtureMembers:
-    """Mixture density networks on summaries, averaged, their widths set on the draws that each left out.
+    """Mixture density networks on summaries, averaged, their width set on the draws that each left out.
 
     Args:
-        summarise, known: as of :func:`cross_fit`.
-        draws: parameters and weights.
+        features: ``(N, F)`` of the training draws.
+        guess: ``(N, D)`` first guesses of the mean, in probit coordinates.
+        target: ``(N, D)`` parameters in probit coordinates.
+        weights: ``(N,)``.
+        scale: ``(D,)`` standard deviations the mixtures start from.
         components: Gaussians of a mixture.
         plan: how they are trained.
         generator: of all that is random.
@@ -156,39 +82,43 @@ class MixtureMembers:
 
     def __init__(
         self,
-        summarise: Summarise,
-        known: list[Tensor],
-        draws: Draws,
+        features: Tensor,
+        guess: Tensor,
+        target: Tensor,
+        weights: Tensor,
+        scale: Tensor,
         components: int,
         plan: Plan,
         generator: torch.Generator,
     ) -> None:
-        target, weights = draws.latent.float(), draws.weights.float()
-        dim = target.shape[1]
+        features, guess, target, weights, scale = (t.float() for t in (features, guess, target, weights, scale))
 
-        def head(summary: Summary) -> Head:
-            return MixtureHead(plan.hidden[-1], dim, components, summary.residual.float())
+        def make() -> SummaryNetwork:
+            head = MixtureHead(plan.hidden[-1], target.shape[1], components, scale)
+            return SummaryNetwork(features.shape[1], plan.hidden, head)
 
-        self.members = cross_fit(head, summarise, known, draws, target, plan, generator)
-        self.widening, self.tail = torch.ones(dim), 0.0
-        if plan.patience:
+        left_out = torch.zeros(len(_TAILS), len(_WIDENINGS))
+        self.networks = []
+        for network, rows in cross_fit(make, [features, guess], target, weights, plan, generator):
+            self.networks.append(network)
             with torch.no_grad():
-                said = [LeftOut(m.held, target[m.held], m.network(*m.inputs)) for m in self.members]
-            self.widening, self.tail = fitted_width(said, weights)
+                outputs = network(features[rows], guess[rows])
+                left_out += _widened_scores(target[rows], weights[rows], outputs)
+        best = int(left_out.argmax())
+        self.tail, self.widening = (
+            (_TAILS[best // len(_WIDENINGS)], _WIDENINGS[best % len(_WIDENINGS)]) if plan.patience else (0.0, 1.0)
+        )
 
-    def posterior(self, known: list[Tensor]) -> MixturePosterior:
-        """The mixture at one measurement."""
-        outputs = []
-        for member in self.members:
-            features, guess = member.summary(known)
-            outputs.append(member.network(features.float(), guess.float()))
+    def posterior(self, features: Tensor, guess: Tensor) -> MixturePosterior:
+        """The mixture at one row of features and first guess."""
+        outputs = [m(features.float(), guess.float()) for m in self.networks]
         core = MixturePosterior.average([mixture(o, self.widening) for o in outputs])
         if self.tail == 0.0:
             return core
         return MixturePosterior(
             np.concatenate([(1.0 - self.tail) * core.weights, self.tail * core.weights]),
             np.concatenate([core.means, core.means]),
-            np.concatenate([core.cholesky, TAIL_WIDTH * core.cholesky]),
+            np.concatenate([core.cholesky, _TAIL_WIDTH * core.cholesky]),
         )
 
 
@@ -196,7 +126,9 @@ class MeanMembers:
     """Networks that predict a mean on the unit cube, averaged, and what they were wrong by on left-out draws.
 
     Args:
-        summarise, known, draws, plan, generator: as of :class:`MixtureMembers`.
+        features, weights, plan, generator: as of :class:`MixtureMembers`.
+        guess: ``(N, D)`` first guesses on the unit cube.
+        target: ``(N, D)`` parameters in the unit cube.
         error: what is minimised, ``"l1"`` or ``"l2"``.
 
     Attributes:
@@ -206,41 +138,50 @@ class MeanMembers:
 
     def __init__(
         self,
-        summarise: Summarise,
-        known: list[Tensor],
-        draws: Draws,
+        features: Tensor,
+        guess: Tensor,
+        target: Tensor,
+        weights: Tensor,
         error: Literal["l1", "l2"],
         plan: Plan,
         generator: torch.Generator,
     ) -> None:
-        target = draws.unit.float()
+        features, guess, target, weights = (t.float() for t in (features, guess, target, weights))
+        scale = ((weights[:, None] * (target - guess) ** 2).sum(0) / weights.sum()).sqrt().clamp(min=1e-3)
 
-        def on_cube(known: list[Tensor], some: Draws) -> Summary:
-            return OnCube(summarise(known, some), some)
+        def make() -> SummaryNetwork:
+            head = MeanHead(plan.hidden[-1], target.shape[1], scale, error)
+            return SummaryNetwork(features.shape[1], plan.hidden, head)
 
-        def head(summary: Summary) -> Head:
-            return MeanHead(plan.hidden[-1], target.shape[1], summary.residual.float(), error)
-
-        self.members = cross_fit(head, on_cube, known, draws, target, plan, generator)
-        residual = []
+        trained = cross_fit(make, [features, guess], target, weights, plan, generator)
+        self.networks = [network for network, _ in trained]
+        residual, share = [], []
         with torch.no_grad():
-            for m in self.members:
-                residual.append(target[m.held] - m.network(*m.inputs))
-        self.residual = torch.cat(residual).double()
-        self.weights = torch.cat([draws.weights[m.held] for m in self.members])
+            for network, rows in trained:
+                residual.append(target[rows] - network(features[rows], guess[rows]))
+                share.append(weights[rows])
+        self.residual, self.weights = torch.cat(residual).double(), torch.cat(share).double()
 
-    def mean(self, known: list[Tensor]) -> Tensor:
+    def mean(self, features: Tensor, guess: Tensor) -> Tensor:
         """``(B, D)`` on the unit cube, float64."""
-        each = []
-        for member in self.members:
-            features, guess = member.summary(known)
-            each.append(member.network(features.float(), guess.float()))
+        each = [m(features.float(), guess.float()) for m in self.networks]
         return torch.stack(each).mean(0).double()
 
 
-def mixture(outputs: tuple[Tensor, Tensor, Tensor], widening: Tensor) -> MixturePosterior:
-    """The first row of a network's mixtures as a posterior, all its standard deviations scaled by ``(D,)``."""
+def mixture(outputs: tuple[Tensor, Tensor, Tensor], widening: float = 1.0) -> MixturePosterior:
+    """The first row of a network's mixtures as a posterior, all its standard deviations scaled."""
     log_weights, means, factors = (t[0].double() for t in outputs)
-    inverse = widening.double()[:, None] * torch.linalg.inv(factors)
+    inverse = widening * torch.linalg.inv(factors)
     # N(m, (P^T P)^-1): the covariance is P^-1 P^-T, and P^-1 is lower triangular like P.
     return MixturePosterior(log_weights.exp().numpy(), means.numpy(), inverse.numpy())
+
+
+def _widened_scores(target: Tensor, weights: Tensor, outputs: tuple[Tensor, Tensor, Tensor]) -> Tensor:
+    """Summed log density of some draws under each part of mass in the tail and each widening."""
+    logits, means, factors = outputs
+    narrow, wide = (
+        torch.stack([mixture_log_prob(target, logits, means, factors / (f * c)) for c in _WIDENINGS])
+        for f in (1.0, _TAIL_WIDTH)
+    )
+    mixed = [torch.logaddexp(narrow + math.log(1.0 - t), wide + math.log(t)) for t in _TAILS]
+    return torch.stack([log_p @ weights for log_p in mixed])

@@ -65,8 +65,7 @@ class TrajectoryFeatures:
 
     The posterior's mean is the summary that loses least (Fearnhead and Prangle 2012). Several networks each leave out
     a part of the draws and predict it, so that what is trained on the predictions meets the errors that new data will
-    have. Of new data each network makes a prediction of its own: their mean would be nearer to the truth than what
-    has been trained on.
+    have; of new data, the mean of all networks' predictions is taken.
 
     Args:
         encoder: made from the training draws.
@@ -119,10 +118,11 @@ class TrajectoryFeatures:
     def _frames(self, points: list[Tensor], seen: list[Tensor]) -> Tensor:
         return self.encoder.embedded(self.networks[0].model.layer, points, seen, 0)
 
-    def __call__(self, points: list[Tensor], seen: list[Tensor]) -> tuple[list[Tensor], Tensor]:
-        """New encoded recordings to predictions ``(B, 2 D)``, one a network, and frames ``(B, F)``, float64."""
+    def __call__(self, points: list[Tensor], seen: list[Tensor]) -> tuple[Tensor, Tensor]:
+        """New encoded recordings to predictions ``(B, 2 D)`` and frames ``(B, F)``, float64."""
         inputs, masks = self.encoder.coded(points, seen, self.plan.frames, self.plan.points)
-        return [_predicted(network, [*inputs, *masks]) for network in self.networks], self._frames(points, seen)
+        each = [_predicted(network, [*inputs, *masks]) for network in self.networks]
+        return torch.stack(each).mean(0), self._frames(points, seen)
 
 
 def _predicted(network: TimeNetwork, given: list[Tensor]) -> Tensor:

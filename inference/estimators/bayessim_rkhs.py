@@ -33,9 +33,9 @@ class BayesSimRKHS(TrainedEstimator):
     - the layer is learned on some frames, then every frame is embedded with it, and the embedded trajectory is
       summarised by principal components and kernel ridge regression (leave-one-out,
       :mod:`~..embedding.ridge`); where points correspond, so are their displacements;
-    - several small networks, each stopped early on draws that it leaves out, turn summaries made without those draws
-      into mixtures, which are averaged; a scale of the standard deviations of each parameter, and the mass in a
-      wider copy of the mixture, are set on the left-out draws.
+    - several small networks, each stopped early on draws that it leaves out, turn the summaries into mixtures,
+      which are averaged; one scale of all standard deviations, and the mass in a wider copy of the mixture, are set
+      on the left-out draws.
 
     Training takes seconds for hundreds of draws. A measurement far outside the range of the draws is pulled to its
     border: check a posterior against the measurement before trusting it.
@@ -65,5 +65,5 @@ class BayesSimRKHS(TrainedEstimator):
             encoder, points, seen, draws.latent, draws.weights, head, torch.zeros(dim), s.layer, generator
         )
         if not s.summaries:
-            return lambda batch: mixture(rows.outputs(*encoder.points(batch)), torch.ones(dim))
+            return lambda batch: mixture(rows.outputs(*encoder.points(batch)))
         return mixture_answer(rows, rows.blocks(points, seen), draws, s, s.components, generator)

@@ -8,11 +8,12 @@ from torch import Tensor
 
 from ...core.arrays import FloatArray
 from ..density.draws import Draws
-from ..density.members import MeanMembers, MixtureMembers, Summarise
+from ..density.members import MeanMembers, MixtureMembers
 from ..embedding.plain import PlainRows
 from ..embedding.rows import Rows
 from ..embedding.summaries import Summaries
 from ..posterior.cube_gaussian import cube_gaussian
+from ..posterior.mixture import MixturePosterior
 from .base import Answer
 from .network_settings import NetworkSettings
 from .rkhs_settings import RKHSSettings
@@ -21,15 +22,11 @@ from .rkhs_settings import RKHSSettings
 _LEAST = 1e-4
 
 
-def summarising(s: NetworkSettings | RKHSSettings) -> Summarise:
-    """Features and first guesses of draws, as the settings ask for them."""
-
-    def summarise(blocks: list[Tensor], draws: Draws) -> Summaries | PlainRows:
-        if not s.summaries:
-            return PlainRows(blocks, draws.latent)
-        return Summaries(blocks, draws.unit, draws.weights, s.principal, s.shown)
-
-    return summarise
+def summarised(blocks: list[Tensor], draws: Draws, s: NetworkSettings | RKHSSettings) -> Summaries | PlainRows:
+    """Features and first guesses of the draws, as the settings ask for them."""
+    if not s.summaries:
+        return PlainRows(blocks, draws.latent)
+    return Summaries(blocks, draws.unit, draws.weights, s.principal, s.shown)
 
 
 def mixture_answer(
@@ -47,8 +44,11 @@ def mixture_answer(
         draws, s, generator: the draws, the settings and the source of all that is random.
         components: Gaussians of a mixture.
     """
-    members = MixtureMembers(summarising(s), blocks, draws, components, s.plan, generator)
-    return lambda batch: members.posterior(rows(batch))
+    summaries = summarised(blocks, draws, s)
+    members = MixtureMembers(
+        *summaries.training, draws.latent, draws.weights, summaries.residual, components, s.plan, generator
+    )
+    return lambda batch: members.posterior(*summaries(rows(batch)))
 
 
 def gaussian_answer(
@@ -67,9 +67,16 @@ def gaussian_answer(
         error: what the networks minimise, and what the width comes from (:func:`error_covariance`).
         correlated: whether errors of different parameters may go together.
     """
-    members = MeanMembers(summarising(s), blocks, draws, error, s.plan, generator)
+    summaries = summarised(blocks, draws, s)
+    features, guess = summaries.training
+    members = MeanMembers(features, torch.special.ndtr(guess), draws.unit, draws.weights, error, s.plan, generator)
     covariance = error_covariance(members.residual.numpy(), members.weights.numpy(), error, correlated)
-    return lambda batch: cube_gaussian(members.mean(rows(batch))[0].numpy(), covariance)
+
+    def answer(batch: list[FloatArray]) -> MixturePosterior:
+        features, guess = summaries(rows(batch))
+        return cube_gaussian(members.mean(features, torch.special.ndtr(guess))[0].numpy(), covariance)
+
+    return answer
 
 
 def error_covariance(

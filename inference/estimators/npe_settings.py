@@ -33,7 +33,7 @@ class Settings:
 
     heads: str = "mixture+flow"
     members: int = 5
-    held_out: float = 0.2
+    held_out: float = 0.1
     coordinates: str = "auto"
     components: int = 8
     hidden: tuple[int, ...] = (64, 64)
