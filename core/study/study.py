@@ -166,10 +166,7 @@ class Study:
             output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one.
             overwrite: replace a file that is there.
         """
-        if not REGISTRY.get("effect", effect).candidate:
-            raise InputError(
-                f"{effect!r} is no effect by itself; muslin unknown finds one, muslin add --law FILE adds it"
-            )
+        REGISTRY.get("effect", effect)
         if effect in self.config.effects:
             raise InputError(f"{self.path} has {effect!r} already")
         path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")
