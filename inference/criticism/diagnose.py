@@ -46,7 +46,9 @@ def diagnose(study: Study) -> Diagnosis:
     with study.pool(problem) as pool:
         work = Work(study, problem, pool, fit)
         found = find(work, names, _fitted(study))
-        pair = BeforeAfter(work, (work.space(()), found.first.plain.unit), (found.after.space, found.after.fit.unit))
+        # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain
+        started = work.space(()), _fitted(study)
+        pair = BeforeAfter(work, started, (found.after.space, found.after.fit.unit))
         count = work.count
     result = _result(study, found, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
@@ -113,7 +115,7 @@ def _result(study: Study, found: Findings, pair: BeforeAfter, work: Work, count:
                 "z": e.z(c),
                 "behind": c.rss - e.nearest.rss,
                 "objection": objection(e, c),
-                "held_out_before": e.held_out_plain if held else None,
+                "held_out_before": before if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "identifiability": c.surviving if c.visible else 0.0,
             }
