@@ -1,6 +1,6 @@
 """Least squares from a good start: the best parameters and how far the data let them move."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,7 +60,7 @@ class Objective:
         pool: where rollouts run.
         space: parameters, in the order of the unit vector.
         recordings: names.
-        fixed: values of other parameters.
+        given: values of other parameters, by recording.
         discrepancy: how else than by noise a right model may be off; residuals are whitened by it too.
     """
 
@@ -71,18 +71,18 @@ class Objective:
         recordings: Sequence[str],
         noise: Noise,
         offsets: Offsets,
-        fixed: dict[str, float] | None = None,
+        given: Mapping[str, dict[str, float]] | None = None,
         discrepancy: Discrepancy = NONE,
     ) -> None:
         self.pool, self.space, self.recordings = pool, space, list(recordings)
         self.discrepancy = discrepancy
-        self.noise, self.offsets, self.fixed = noise, offsets, dict(fixed or {})
+        self.noise, self.offsets, self.given = noise, offsets, dict(given or {})
         self._last: tuple[FloatArray, FloatArray] | None = None
 
     def many(self, units: FloatArray) -> list[FloatArray | None]:
         """White residuals ``(N,)`` at every row of ``units (K, D)``; None where a rollout failed."""
         tasks = [
-            Task({**self.fixed, **self.space.as_dict(self.space.from_unit(u))}, r)
+            Task({**self.given.get(r, {}), **self.space.as_dict(self.space.from_unit(u))}, r)
             for u in units
             for r in self.recordings
         ]

@@ -1,7 +1,7 @@
 """The study: one file that names everything, and one store that holds every result."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
 from ..store import damage_errors, new_store, open_store
-from .config import StudyConfig, read_config, write_config
+from .config import ParameterTable, StudyConfig, read_config, write_config
 from .pool import SimulationPool
 from .problem import Problem, build_problem
 
@@ -158,13 +158,22 @@ class Study:
         """Write the posterior for other programs; see the step ``export``."""
         REGISTRY.get("step", "export")(self, kind, Path(path), **options)
 
-    def add(self, effect: str, output: str | Path | None = None, *, overwrite: bool = False) -> "Study":
+    def add(
+        self,
+        effect: str,
+        output: str | Path | None = None,
+        *,
+        overwrite: bool = False,
+        coefficients: Mapping[str, float | ParameterTable] | None = None,
+    ) -> "Study":
         """A study of the same model with one more effect, its coefficients inferred.
 
         Args:
             effect: name of an effect plugin.
             output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one.
             overwrite: replace a file that is there.
+            coefficients: fixed values and priors, as the study file takes them; those not named are inferred under
+                the effect's own priors.
         """
         REGISTRY.get("effect", effect)
         if effect in self.config.effects:
@@ -173,7 +182,7 @@ class Study:
         if path.exists() and not overwrite:
             raise InputError(f"{path} exists already; name another file, or say overwrite=True (--force)")
         config = self.config.model_copy(deep=True)
-        config.effects[effect] = {}
+        config.effects[effect] = dict(coefficients or {})
         if config.study.results is not None:
             config.study.results = f"{path.stem}.results.zarr"
         if path.parent.resolve() != self.path.parent.resolve():

@@ -1,7 +1,7 @@
 """The step ``diagnose``: which physical effect is missing from the model?"""
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ...core.arrays import FloatArray
@@ -14,7 +14,8 @@ from .candidate import Candidate
 from .candidate_names import candidate_names
 from .sentences import explain, told
 from .stepwise import Findings, find
-from .verdict import objection
+from .told import Told
+from .verdict import Evidence, objection
 from .where import where_it_is
 from .work import Work
 
@@ -22,18 +23,8 @@ from .work import Work
 KEPT = 4
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Told):
     """What :func:`diagnose` found: the JSON of ``muslin diagnose --json`` and a text for people."""
-
-    result: dict[str, Any]
-    paragraphs: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        return self.result
-
-    def text(self) -> str:
-        return "\n".join(self.paragraphs)
 
 
 def diagnose(study: Study) -> Diagnosis:
@@ -49,8 +40,9 @@ def diagnose(study: Study) -> Diagnosis:
         # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain
         started = work.space(()), _fitted(study)
         pair = BeforeAfter(work, started, (found.after.space, found.after.fit.unit))
+        joint = work.jointly(found.first.plain, found.after)
         count = work.count
-    result = _result(study, found, pair, work, count, time.monotonic() - began)
+    result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
     paragraphs = explain(result)
     with storage_errors(study.results_path):
@@ -95,7 +87,9 @@ def _models(found: Findings) -> list[dict[str, Any]]:
     ]
 
 
-def _result(study: Study, found: Findings, pair: BeforeAfter, work: Work, count: int, seconds: float) -> dict[str, Any]:
+def _result(
+    study: Study, found: Findings, joint: Evidence, pair: BeforeAfter, work: Work, count: int, seconds: float
+) -> dict[str, Any]:
     first, after = found.first, found.after
     e = first.evidence
     problem = work.problem
@@ -136,10 +130,10 @@ def _result(study: Study, found: Findings, pair: BeforeAfter, work: Work, count:
             "fitted_after": fitted[1] if changed else fitted[0],
         },
         "evidence": {
-            "misfit": e.rss_plain / e.count,
-            "misfit_after": after.rss / e.count,
-            "explained": e.explained(after),
-            "numerics": after.numerics / e.excess,
+            "misfit": joint.rss_plain / joint.count,
+            "misfit_after": after.rss / joint.count,
+            "explained": joint.explained(after),
+            "numerics": joint.nearest.numerics / joint.excess,
         },
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,

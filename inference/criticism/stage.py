@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ..polish import Polished, polish
+from ..polish import Polished
 from .candidate import Candidate, best_starts, drop_z, screening_points
 from .linear import Look, least_square, look_at
 from .verdict import SIGNIFICANT, Decision, Evidence, decide, has_misfit
@@ -154,14 +154,13 @@ def _again(work: Work, stage: Stage) -> Stage:
     Only once the verdict stands: of all candidates the leader alone would have it easier than its rivals.
     """
     c = stage.chosen
-    if c.rss < stage.evidence.count * 1.02:
-        return stage  # nothing is left
+    if stage.evidence.left(c) == 0.0 or work.spent:
+        return stage
     effects = (*stage.effects, c.name)
     rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
     points = screening_points(c.space, c.base, c.fit.unit[None, : c.base], work.study.config.diagnose.draws, rng)
-    fits = [c.fit]
-    for unit, _ in best_starts(work.objective(effects), points)[:RESTARTS]:
-        fits.append(polish(work.objective(effects), unit, MORE_EVALUATIONS))
-    better = replace(c, fit=min(fits, key=lambda p: p.rss))
-    candidates = [better if other is c else other for other in stage.evidence.candidates]
-    return replace(stage, evidence=work.evidence(stage.effects, stage.plain, candidates))
+    starts = best_starts(work.objective(effects), points)[:RESTARTS]
+    fits = [c.fit, *(work.polished(effects, unit, MORE_EVALUATIONS) for unit, _ in starts)]
+    better = work.judged(replace(c, fit=min(fits, key=lambda p: p.rss)))
+    candidates = tuple(better if other is c else other for other in stage.evidence.candidates)
+    return replace(stage, evidence=replace(stage.evidence, candidates=candidates))

@@ -80,7 +80,7 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
         if work.spent or not rest:
             return None
         stage = run_stage(work, (lead.name,), rest, lead.fit.unit)
-        if stage.decision.verdict == "named" and e.accounted(stage.chosen):
+        if stage.decision.verdict == "named" and work.jointly(first.plain, stage.chosen).accounted(stage.chosen):
             pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
             return _forward(work, names, _without_idle(work, pair))
     return None
@@ -90,17 +90,15 @@ def _without_idle(work: Work, found: Findings) -> Findings:
     """Backward: drop an effect, named before the last one, that the others do without."""
     best = found.after
     left = found.last.evidence.left(best)
-    for name in found.effects[:-1]:
-        others = tuple(e for e in found.effects if e != name)
+    for dropped in found.effects[:-1]:
+        others = tuple(e for e in found.effects if e != dropped)
         space = work.space(others)
-        values = best.space.as_dict(best.space.from_unit(best.fit.unit))
-        kept = [list(best.space.names).index(p.name) for p in space]
+        kept = [best.space.names.index(name) for name in space.names]
         fit = work.polished(others, best.fit.unit[kept], MORE_EVALUATIONS)
         if fit.rss - best.rss < MARGIN + SHARE_LEFT * left:
-            base = len(space) - sum(n.startswith(f"{others[-1]}.") for n in values)
+            base = len(work.space(others[:-1]))
             after = replace(best, name=others[-1], space=space, base=base, fit=fit)
-            held, white = work.held_out(space, fit.unit)
-            return replace(found, effects=others, after=replace(after, held_out=held, held_out_white=white))
+            return replace(found, effects=others, after=work.judged(after))
     return found
 
 

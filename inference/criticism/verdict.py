@@ -7,6 +7,7 @@ import numpy as np
 from scipy import stats
 
 from .candidate import Candidate, root_mean_square, z_value
+from .misfit import chance, is_misfit
 
 Verdict = Literal["named", "tied", "none", "cannot-tell", "no-misfit"]
 
@@ -24,8 +25,6 @@ SHARE_LEFT = 0.5
 HELD_OUT_SHARE = 0.2
 #: ... where there is more of it than this share of the noise variance.
 HELD_OUT_SLACK = 0.02
-#: Misfit that is not worth an explanation: excess over the noise variance, as a share of it.
-NEGLIGIBLE = 0.10
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,8 @@ class Evidence:
 
     @property
     def chance(self) -> float:
-        """What noise may leave beyond :attr:`count`: four standard deviations of its sum, and of its estimate two."""
-        return float(4.0 * np.sqrt(2.0 * self.count) + 4.0 * self.noise_error * self.count)
+        """What noise may leave beyond :attr:`count` [noise variances]."""
+        return chance(self.count, self.noise_error)
 
     @property
     def floor(self) -> float:
@@ -112,8 +111,7 @@ class Decision:
 
 def has_misfit(e: Evidence) -> bool:
     """Is there more misfit than the noise, and its own uncertainty, explain?"""
-    allowed = max(NEGLIGIBLE, 6 * e.noise_error + 4 * np.sqrt(2 / e.count))
-    return bool(e.rss_plain / e.count > 1 + allowed)
+    return is_misfit(e.rss_plain, e.count, e.noise_error)
 
 
 #: Why a candidate is not the answer: what was asked of it and not met, in the order in which it is asked.

@@ -1,19 +1,20 @@
 """What all stages of a diagnosis share: rollouts and their budget, objectives, held-out errors."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
-from ...core.rollout import Trajectory
-from ...core.study import Problem, SimulationPool, Study, Task
+from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import NONE
 from ..polish import Objective, Polished, polish
-from ..residuals import residual
+from ..residuals import Residual
 from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
-from .candidate import Candidate
+from .candidate import Candidate, root_mean_square
+from .held_out import held_out_residuals
 from .numerics import numerical_discrepancy
 from .verdict import Evidence
 
@@ -36,6 +37,7 @@ class Work:
         self.limit = study.config.diagnose.simulations
         self.discrepancy = NONE
         self._elsewhere = 0  # rollouts of other engines and meshes
+        self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
 
     @property
     def count(self) -> int:
@@ -69,43 +71,48 @@ class Work:
         each = (1 + len(objective.space)) * len(self.problem.fit_on)
         return polish(objective, start, max(1, min(evaluations, (self.limit - self.count) // each)))
 
-    def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: list[Candidate]) -> Evidence:
-        """Hold out, and put together what decides."""
+    def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
+        """Hold out, and put together what decides between candidates for the model that has ``effects``."""
         space = self.space(effects)
-        raw, white = self.held_out(space, plain.unit)
-        full = []
-        for c in candidates:
-            held, held_white = self.held_out(c.space, c.fit.unit) if c.rss < plain.rss else (raw, white)
-            full.append(
-                replace(c, held_out=held, held_out_white=held_white, numerics=self.numerics_of(effects, c.name, c.fit))
-            )
+        held, white = self.held_out(space, plain.unit)
         return Evidence(
             rss_plain=plain.rss,
             count=max(plain.count - len(space), 1.0),
-            held_out_plain=float(np.sqrt(np.mean(np.square(list(raw.values()))))) if raw else float("nan"),
+            held_out_plain=root_mean_square(list(held.values())),
             held_out_white=white,
             noise_sd=self.fit.noise.sd,
             noise_error=self.fit.noise.relative_error,
-            candidates=tuple(full),
+            candidates=tuple(self.judged(c) for c in candidates),
         )
 
-    def numerics_of(self, effects: tuple[str, ...], name: str, fit: Polished) -> float:
-        """What the numerics explain in the residuals of a fit [noise variances]."""
-        parts = self.objective((*effects, name)).parts(fit.white)
-        return sum(self.discrepancy.explained(recording, part) for recording, part in parts.items())
+    def jointly(self, plain: Polished, after: Candidate) -> Evidence:
+        """The model as it was beside all that was found, both whitened by the numerics as last seen."""
+        again = self.objective(()).one(plain.unit)
+        return self.evidence((), replace(plain, white=again), [after])
+
+    def judged(self, candidate: Candidate) -> Candidate:
+        """With its held-out errors, and what the numerics explain in its residuals [noise variances]."""
+        held, white = self.held_out(candidate.space, candidate.fit.unit)
+        parts = self.objective(()).parts(candidate.fit.white)
+        numerics = sum(self.discrepancy.explained(recording, part) for recording, part in parts.items())
+        return replace(candidate, held_out=held, held_out_white=white, numerics=numerics)
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> tuple[dict[str, float], float]:
-        """Root mean square error on every held-out recording [unit], and mean square of all, whitened."""
+        """Root mean square error on every held-out recording [unit], and mean square of all, whitened.
+
+        Each point is simulated once.
+        """
         values = space.as_dict(space.from_unit(unit))
-        names = self.problem.hold_out
-        errors, white = {}, []
-        for name, outcome in zip(names, self.pool.map([Task(values, n) for n in names]), strict=True):
-            if not isinstance(outcome, Trajectory):
-                return dict.fromkeys(names, float("inf")), float("inf")
-            r = residual(self.problem.recordings[name], outcome.series, self.fit.noise, self.offsets)
-            errors[name] = r.rms
-            white.append(self.discrepancy.whitened(name, r.white))
-        if not white:
+        # a coefficient of zero is as good as one that is not there
+        key = tuple(sorted((name, value) for name, value in values.items() if value or "." not in name))
+        if key not in self._held_out:
+            self._held_out[key] = held_out_residuals(self.pool, self.problem, space, unit, self.fit.noise, self.offsets)
+        found = self._held_out[key]
+        errors = {name: float("inf") if r is None else r.rms for name, r in found.items()}
+        if not found:
             return {}, float("nan")
+        if any(r is None for r in found.values()):
+            return errors, float("inf")
+        white = [self.discrepancy.whitened(name, r.white) for name, r in found.items() if r is not None]
         all_of_them = np.concatenate(white)
         return errors, float(all_of_them @ all_of_them) / (self.fit.noise.information * len(all_of_them))

@@ -18,6 +18,7 @@ from ....core.study import Problem, Study
 from ...noise import Noise
 from ...sequential.fitting import offsets_of
 from ...sequential.result import load_fit
+from ..told import Told
 from ..verdict import MARGIN, SIGNIFICANT
 from .bench import Bench, Proposal
 from .goal import Goal
@@ -36,24 +37,14 @@ HOPELESS = 0.005
 
 
 @dataclass(frozen=True, eq=False)
-class NextExperiment:
+class NextExperiment(Told):
     """What :func:`propose_next` found.
 
     Args:
-        result: the JSON of ``muslin next --json``.
-        paragraphs: the same for people.
         motion: proposed; None if there is none.
     """
 
-    result: dict[str, Any]
-    paragraphs: tuple[str, ...]
     motion: Motion | None
-
-    def to_json(self) -> dict[str, Any]:
-        return self.result
-
-    def text(self) -> str:
-        return "\n".join(self.paragraphs)
 
     def write(self, path: str | Path) -> None:
         """Write the motion for a robot; see :func:`~.playing.write_motion`.

@@ -3,20 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
+from ..candidate import drop_z
+from ..misfit import chance, is_misfit
+from ..verdict import EXPLAINS, MARGIN, SHARE_LEFT, SIGNIFICANT
 from .refit import RefittedLaw
 
-#: A law stands only if it explains at least this share of the excess misfit on the recordings it was fitted to ...
-EXPLAINS = 0.5
-#: ... and this share of the excess variance on held-out ones, where there is any to speak of [noise variances] ...
+#: Beside what is asked of an effect, a law, which had so many to choose from, must explain this share of the excess
+#: variance on held-out recordings, where there is any to speak of [noise variances].
 HELD_OUT_SHARE, HELD_OUT_EXCESS = 0.5, 0.05
-#: ... with this significance [standard deviations].
-SIGNIFICANT = 4.0
-#: Rivals are worse by more than this in the information criterion, and by this share of what the best leaves.
-MARGIN, SHARE_LEFT = 10.0, 0.5
-#: Misfit that is not worth an explanation: excess over the noise variance, as a share of it.
-NEGLIGIBLE = 0.10
 
 
 @dataclass(frozen=True)
@@ -44,12 +39,11 @@ class Case:
     @property
     def has_misfit(self) -> bool:
         """More than the noise, and what is not known of it, explain."""
-        allowed = max(NEGLIGIBLE, 6 * self.noise_error + 4 * np.sqrt(2 / self.count))
-        return bool(self.rss_plain / self.count > 1 + allowed)
+        return is_misfit(self.rss_plain, self.count, self.noise_error)
 
     def explained(self, law: RefittedLaw) -> float:
         """Share of the excess misfit on fitted recordings that goes away with a law, 0 to 1."""
-        floor = min([self.count, *(c.rss for c in self.laws)])
+        floor = min([self.count + chance(self.count, self.noise_error), *(c.rss for c in self.laws)])
         return float(np.clip((self.rss_plain - law.rss) / max(self.rss_plain - floor, 2 * MARGIN), 0.0, 1.0))
 
     def explained_held_out(self, law: RefittedLaw) -> float | None:
@@ -70,7 +64,7 @@ class Case:
     def significant(self, law: RefittedLaw) -> bool:
         """Is the drop of the misfit beyond what the best of so many laws gains by chance?"""
         drop = max(0.0, self.rss_plain - law.rss) / max(1.0, law.rss / self.count)
-        return bool(stats.chi2.logsf(drop, len(law.terms)) + np.log(self.tried) < stats.norm.logsf(SIGNIFICANT))
+        return drop_z(drop, len(law.terms), self.tried) >= SIGNIFICANT
 
     def holds_up(self, law: RefittedLaw) -> bool:
         """A law must explain what is held out; where nothing is to be explained, it must do no harm."""

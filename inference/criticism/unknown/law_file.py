@@ -95,10 +95,4 @@ def add_law(study: Study, law: Path, output: Path | None = None, *, overwrite: b
     table = law_effect(law)
     if LAW in study.config.effects:
         raise InputError(f"{study.path} has a law already; start from the study that {law} was learned from")
-    made = study.add(LAW, output, overwrite=overwrite)
-    config = made.config.model_copy(deep=True)
-    config.effects[LAW] = table
-    whole = Study(config, made.path, workers=study.workers, progress=study.progress)
-    whole.problem  # noqa: B018  a law that cannot act here is refused now
-    whole.save()
-    return whole
+    return study.add(LAW, output, overwrite=overwrite, coefficients=table)

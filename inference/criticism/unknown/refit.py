@@ -6,13 +6,13 @@ import numpy as np
 
 from ....core.arrays import FloatArray
 from ....core.parameters import Parameter, ParameterSpace
-from ....core.rollout import Trajectory
-from ....core.study import Problem, SimulationPool, Task
+from ....core.study import Problem, SimulationPool
 from ...noise import Noise
 from ...polish import Objective, Polished, polish
-from ...residuals import Offsets, residual
+from ...residuals import Offsets
+from ..held_out import held_out_residuals
 from .estimate import ForceObjective
-from .held import HeldObjective
+from .held import held_objective
 from .search import Guess
 
 #: Name of the effect.
@@ -96,7 +96,7 @@ class Refits:
     def first(self, guess: Guess, unit: FloatArray, force: ForceObjective) -> RefittedLaw:
         """The law polished on a held model from where the search left it; ``unit`` are the parameters there."""
         names = tuple(guess.coefficients)
-        objective = HeldObjective(force, self.objective(names).space)
+        objective = held_objective(force, self.objective(names).space)
         base = len(self.problem.space)
         told = np.array(list(guess.coefficients.values()))
         sized = np.array([n not in _PLACES for n in names])
@@ -136,13 +136,5 @@ class Refits:
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
         """Root mean square error on every held-out recording [unit]; infinite where it cannot be simulated."""
-        values, names = space.as_dict(space.from_unit(unit)), self.problem.hold_out
-        out = {}
-        for name, made in zip(names, self.pool.map([Task(values, n) for n in names]), strict=True):
-            recording = self.problem.recordings[name]
-            out[name] = (
-                residual(recording, made.series, self.noise, self.offsets).rms
-                if isinstance(made, Trajectory)
-                else float("inf")
-            )
-        return out
+        found = held_out_residuals(self.pool, self.problem, space, unit, self.noise, self.offsets)
+        return {name: float("inf") if r is None else r.rms for name, r in found.items()}

@@ -2,8 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,8 +16,10 @@ from ...polish import Objective
 from ...residuals import Offsets
 from ...sequential.fitting import offsets_of
 from ...sequential.result import FitResult, load_fit
+from ..misfit import NEGLIGIBLE
+from ..told import Told
 from .basis import make_basis
-from .decision import NEGLIGIBLE, Case, LawDecision, decide
+from .decision import Case, LawDecision, decide
 from .estimate import Estimate, ForceObjective, Unknowns
 from .field import Aim, field_effect
 from .follow import follow, make_aim
@@ -35,18 +36,8 @@ FUNCTIONS, MOST_FUNCTIONS = 180, 90
 MOST_RECORDINGS = 3
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(Told):
     """What :func:`unknown` found: JSON, which ``muslin add --law`` reads too, and a text for people."""
-
-    result: dict[str, Any]
-    paragraphs: tuple[str, ...]
-
-    def to_json(self) -> dict[str, Any]:
-        return self.result
-
-    def text(self) -> str:
-        return "\n".join(self.paragraphs)
 
 
 def unknown(study: Study) -> Finding:
