@@ -1,35 +1,57 @@
-"""Directions in which a right model may still be off: what a smaller step or another engine would change."""
+"""How a right model may still be off: directions that a smaller step or another engine would change, and chance."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from ..core.arrays import FloatArray
 
+#: Residuals with more chance than this are left out [noise variances].
+MOST_CHANCE = 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class Discrepancy:
-    """Low-rank error of the model beside the noise: residuals are ``D a + noise`` with ``a ~ N(0, I)``.
+    """Error of the model beside the noise: residuals are ``D a + chance + noise`` with ``a ~ N(0, I)``.
 
-    White residuals then have the covariance ``I + D D'``. Whitening by it takes off what lies along the directions,
-    as far as their amplitudes are free to explain it, and leaves everything else as it is (model discrepancy as a
-    nuisance: Kennedy and O'Hagan 2001, with the directions told by computer experiments).
+    White residuals then have the covariance ``I + V + D D'``. Whitening by it takes off what lies along the directions,
+    as far as their amplitudes are free to explain it, weighs down what chance decides, and leaves everything else as it
+    is (model discrepancy as a nuisance: Kennedy and O'Hagan 2001, told by computer experiments). Where chance is more
+    than the noise, residuals become zero and count no more: derivatives are of chance, too, there.
 
     Args:
         directions: ``D``, ``(N_r, K)`` a recording, in units of the noise; recordings without any may be missing.
+        chance: diagonal of ``V``, ``(N_r,)`` a recording [noise variances]; the same.
     """
 
-    directions: Mapping[str, FloatArray]
+    directions: Mapping[str, FloatArray] = field(default_factory=dict)
+    chance: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @cached_property
     def _factors(self) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Left singular vectors and singular values, a recording."""
-        return {name: np.linalg.svd(d, full_matrices=False)[:2] for name, d in self.directions.items()}
+        """Left singular vectors and singular values, a recording, of what is scaled by chance already."""
+        scaled = {name: d * self._scale(name, d[:, 0])[:, None] for name, d in self.directions.items()}
+        return {name: np.linalg.svd(d, full_matrices=False)[:2] for name, d in scaled.items()}
+
+    def _scale(self, recording: str, like: FloatArray) -> FloatArray:
+        v = self.chance.get(recording, np.zeros_like(like))
+        return np.asarray(np.where(v > MOST_CHANCE, 0.0, 1.0 / np.sqrt(1.0 + v)))
+
+    def dropped(self, recordings: Sequence[str]) -> int:
+        """How many of the residuals of ``recordings`` do not count."""
+        return int(sum(np.sum(self.chance[name] > MOST_CHANCE) for name in recordings if name in self.chance))
+
+    def left_to_chance(self, recordings: Sequence[str]) -> float:
+        """How many of those that count are chance's rather than noise's."""
+        seen = [self.chance[name] for name in recordings if name in self.chance]
+        return float(sum(np.sum(np.where(v > MOST_CHANCE, 0.0, v / (1.0 + v))) for v in seen))
 
     def whitened(self, recording: str, white: FloatArray) -> FloatArray:
-        """``(I + D D')^-1/2`` times white residuals ``(N_r,)``."""
+        """``(I + V + D D')^-1/2`` times white residuals ``(N_r,)``, scaled by chance first."""
+        if recording in self.chance:
+            white = white * self._scale(recording, white)
         if recording not in self.directions:
             return white
         u, s = self._factors[recording]
@@ -44,4 +66,4 @@ class Discrepancy:
         return float(np.sum((s**2 / np.sqrt(1.0 + s**2) * (u.T @ whitened)) ** 2))
 
 
-NONE = Discrepancy({})
+NONE = Discrepancy()

@@ -33,19 +33,14 @@ class Polished:
         covariance: of ``unit``, from the curvature at the best fit (Laplace), ``(D, D)``.
         jacobian: of the white residuals ``(N, D)``.
         white: white residuals at the best fit ``(N,)``.
-        information: of one residual, below 1 where noise is correlated in time.
+        count: independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left.
     """
 
     unit: FloatArray
     covariance: FloatArray
     jacobian: FloatArray
     white: FloatArray
-    information: float
-
-    @property
-    def count(self) -> float:
-        """Independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left."""
-        return self.information * len(self.white)
+    count: float
 
     @property
     def rss(self) -> float:
@@ -103,6 +98,21 @@ class Objective:
         sizes = [len(failed(self.pool.problem.recordings[name], self.offsets)) for name in self.recordings]
         return dict(zip(self.recordings, np.split(white, np.cumsum(sizes)[:-1]), strict=True))
 
+    def count(self, white: FloatArray) -> float:
+        """Independent numbers that white residuals ``(N,)`` are worth."""
+        return self.noise.information * (len(white) - self.discrepancy.dropped(self.recordings))
+
+    def information(self, jacobian: FloatArray) -> FloatArray:
+        """Of the data on a point of the unit cube ``(D, D)``, given the Jacobian ``(N, D)`` there.
+
+        What a derivative by differences has from chance is taken off twice, as it is not known well.
+        """
+        by_chance = 2.0 * self.noise.information * self.discrepancy.left_to_chance(self.recordings) / STEP**2
+        if by_chance == 0.0:
+            return np.asarray(jacobian.T @ jacobian)
+        values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
+        return np.asarray((vectors * np.maximum(values - 2.0 * by_chance, 0.0)) @ vectors.T)
+
     def one(self, unit: FloatArray) -> FloatArray:
         """White residuals ``(N,)`` at ``unit (D,)``; a failed rollout counts as far off everywhere."""
         if self._last is None or not np.array_equal(self._last[0], unit):
@@ -149,10 +159,8 @@ def polish(objective: Objective, start: FloatArray, evaluations: int = 12) -> Po
     )
     jacobian, white = np.asarray(result.jac, float), np.asarray(result.fun, float)
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
-    information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
-    return Polished(
-        np.asarray(result.x, float), np.linalg.inv(information), jacobian, white, objective.noise.information
-    )
+    information = objective.information(jacobian) + 12.0 * np.eye(len(start))
+    return Polished(np.asarray(result.x, float), np.linalg.inv(information), jacobian, white, objective.count(white))
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:

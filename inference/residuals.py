@@ -95,6 +95,13 @@ def failed(recording: Recording, offsets: Offsets) -> FloatArray:
     return np.full(seen + (offsets.clock > 0) + axes * (offsets.constant > 0), FAILED)
 
 
+def by_residual(recording: Recording, offsets: Offsets, by_frame: FloatArray) -> FloatArray:
+    """Numbers of every frame ``(T,)``, repeated for its white residuals ``(N,)``; zero for the offsets' own."""
+    points = recording.series.points
+    seen = np.broadcast_to(by_frame[:, None, None], points.shape)[np.isfinite(points)]
+    return np.concatenate([seen, np.zeros(len(failed(recording, offsets)) - len(seen))])
+
+
 def _solve(
     difference: FloatArray, slope: FloatArray, clock: float, noise: Noise, offsets: Offsets
 ) -> tuple[float, FloatArray]:

@@ -8,6 +8,7 @@ from ...core.arrays import FloatArray
 from ...core.registry import REGISTRY
 from ...core.store import put, read, storage_errors
 from ...core.study import Study
+from ..roughness import unrepeatable
 from ..sequential.result import load_fit
 from .before_after import BeforeAfter
 from .candidate import Candidate
@@ -135,6 +136,7 @@ def _result(
             "explained": joint.explained(after),
             "numerics": joint.nearest.numerics / joint.excess,
         },
+        "unrepeatable": unrepeatable(work.rough, problem.recordings, work.fit.noise),
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,
         "budget_spent": work.spent,

@@ -6,15 +6,16 @@ import numpy as np
 NEGLIGIBLE = 0.10
 
 
-def is_misfit(rss: float, count: float, noise_error: float) -> bool:
+def is_misfit(rss: float, count: float, noise_error: float, unsure: float = 0.0) -> bool:
     """Is there more than the noise, and what is not known of it, explain?
 
     Args:
         rss: residual sum of squares [noise variances].
         count: degrees of freedom: independent residuals less parameters.
         noise_error: relative standard error of the noise's standard deviation.
+        unsure: what else may be there or not, as the model cannot be repeated.
     """
-    allowed = max(NEGLIGIBLE, 6 * noise_error + 4 * np.sqrt(2 / count))
+    allowed = max(NEGLIGIBLE, 6 * noise_error + 4 * np.sqrt(2 / count)) + unsure / count
     return bool(rss / count > 1 + allowed)
 
 

@@ -13,7 +13,6 @@ from ...core.rollout import Trajectory
 from ...core.series import PointSeries
 from ...core.simulator import Simulator
 from ...core.study import Problem, SimulationPool, Task
-from ..discrepancy import Discrepancy
 from ..noise import Noise
 from ..residuals import Offsets, residual
 
@@ -22,9 +21,9 @@ from ..residuals import Offsets, residual
 _STEP, _MESH = 2.0, 4.0 / 3.0
 
 
-def numerical_discrepancy(
+def numerical_directions(
     pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets
-) -> tuple[Discrepancy, int]:
+) -> tuple[dict[str, FloatArray], int]:
     """What the numbers of the pool's problem may be off by at ``values``, and the rollouts elsewhere that it took.
 
     Each direction comes twice, constant and growing over the recording, as errors of a rollout do. Directions that
@@ -53,8 +52,7 @@ def numerical_discrepancy(
             for name, other in _predicted(elsewhere, values, names).items():
                 if name in as_it_is:
                     columns[name] += _columns(problem, name, as_it_is[name], other, size, noise, offsets)
-    found = {n: np.stack(c, axis=1) for n, c in columns.items() if c}
-    return Discrepancy(found), len(names) * len(variants)
+    return {n: np.stack(c, axis=1) for n, c in columns.items() if c}, len(names) * len(variants)
 
 
 def _others(simulator: Simulator) -> list[Simulator]:

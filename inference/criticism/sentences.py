@@ -24,6 +24,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
         "verdict": _verdict(result, effects),
         "further": _further(result),
         "where": _where(result),
+        "unrepeatable": _unrepeatable(result),
         "alternatives": _alternatives(result),
         "invisible": _invisible(result),
         "to_be_sure": _to_be_sure(study, result),
@@ -97,6 +98,14 @@ def _where(result: dict[str, Any]) -> str:
         f"Where: {100 * where['share']:.0f} % of the error that goes is in {where['recording']}, most of it from "
         f"{where['from']:.2f} to {where['to']:.2f} s{point}."
     )
+
+
+def _unrepeatable(result: dict[str, Any]) -> str:
+    loose = result["unrepeatable"]
+    if not loose:
+        return ""
+    where = "; ".join(loose)
+    return f"Left to chance: next to nothing in the parameters moves {where}; what is measured there does not count."
 
 
 def _alternatives(result: dict[str, Any]) -> str:

@@ -40,6 +40,7 @@ class Evidence:
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
         candidates: refitted.
+        unsure: what else may be left or not, as the model cannot be repeated [noise variances].
     """
 
     rss_plain: float
@@ -49,11 +50,12 @@ class Evidence:
     noise_sd: float
     noise_error: float
     candidates: tuple[Candidate, ...]
+    unsure: float = 0.0
 
     @property
     def chance(self) -> float:
-        """What noise may leave beyond :attr:`count` [noise variances]."""
-        return chance(self.count, self.noise_error)
+        """What noise may leave beyond :attr:`count`, and what cannot be repeated [noise variances]."""
+        return chance(self.count, self.noise_error) + self.unsure
 
     @property
     def floor(self) -> float:
@@ -111,7 +113,7 @@ class Decision:
 
 def has_misfit(e: Evidence) -> bool:
     """Is there more misfit than the noise, and its own uncertainty, explain?"""
-    return is_misfit(e.rss_plain, e.count, e.noise_error)
+    return is_misfit(e.rss_plain, e.count, e.noise_error, e.unsure)
 
 
 #: Why a candidate is not the answer: what was asked of it and not met, in the order in which it is asked.

@@ -8,14 +8,15 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
-from ..discrepancy import NONE
+from ..discrepancy import NONE, Discrepancy
 from ..polish import Objective, Polished, polish
 from ..residuals import Residual
+from ..roughness import chance_of, roughness
 from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
 from .candidate import Candidate, root_mean_square
 from .held_out import held_out_residuals
-from .numerics import numerical_discrepancy
+from .numerics import numerical_directions
 from .verdict import Evidence
 
 
@@ -27,6 +28,7 @@ class Work:
 
     Attributes:
         discrepancy: how far the model's own numbers may be off, as last seen.
+        rough: what it cannot repeat, a frame ``(T,)`` [m or px], by recording, as last seen.
         limit: of rollouts.
     """
 
@@ -36,6 +38,7 @@ class Work:
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
         self.limit = study.config.diagnose.simulations
         self.discrepancy = NONE
+        self.rough: dict[str, FloatArray] = {}
         self._elsewhere = 0  # rollouts of other engines and meshes
         self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
 
@@ -59,10 +62,14 @@ class Work:
         )  # fmt: skip
 
     def see_numerics(self, effects: tuple[str, ...], unit: FloatArray) -> None:
-        """Look at the model's own errors where it fits best so far."""
+        """Look at the model's own errors where it fits best so far, and at what it cannot repeat there."""
         space = self.space(effects)
         values = space.as_dict(space.from_unit(unit))
-        self.discrepancy, cost = numerical_discrepancy(self.pool, values, self.fit.noise, self.offsets)
+        directions, cost = numerical_directions(self.pool, values, self.fit.noise, self.offsets)
+        names = (*self.problem.fit_on, *self.problem.hold_out)
+        self.rough = roughness(self.pool, space, unit, names)
+        chance = chance_of(self.rough, self.problem.recordings, self.fit.noise, self.offsets)
+        self.discrepancy = Discrepancy(directions, chance)
         self._elsewhere += cost
 
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
@@ -83,6 +90,7 @@ class Work:
             noise_sd=self.fit.noise.sd,
             noise_error=self.fit.noise.relative_error,
             candidates=tuple(self.judged(c) for c in candidates),
+            unsure=self.fit.noise.information * self.discrepancy.left_to_chance(self.problem.fit_on),
         )
 
     def jointly(self, plain: Polished, after: Candidate) -> Evidence:
@@ -115,4 +123,5 @@ class Work:
             return errors, float("inf")
         white = [self.discrepancy.whitened(name, r.white) for name, r in found.items() if r is not None]
         all_of_them = np.concatenate(white)
-        return errors, float(all_of_them @ all_of_them) / (self.fit.noise.information * len(all_of_them))
+        count = self.fit.noise.information * (len(all_of_them) - self.discrepancy.dropped(list(found)))
+        return errors, float(all_of_them @ all_of_them) / max(count, 1.0)

@@ -1,4 +1,4 @@
-"""What makes the numbers of a fit doubtful, found out with two more rollouts."""
+"""What makes the numbers of a fit doubtful, found out with a few more rollouts."""
 
 import numpy as np
 
@@ -7,35 +7,34 @@ from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import SimulationPool, Task
 from ..noise import Noise
-
-#: A change of the parameters this small [relative] must not be seen in the prediction.
-NUDGE = 1e-9
+from ..roughness import roughness, unrepeatable
 
 
-def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, recording: str, noise: Noise) -> list[str]:
+def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
     """Sentences for people; empty if nothing is doubtful.
 
-    A chaotic rollout has no derivative to speak of, and neither best fit nor standard deviation mean
-    much. A motion that is rough at the frame rate passes for noise where the noise is estimated from
-    roughness.
+    What a rollout does by chance tells nothing of the parameters. A motion that is rough at the frame rate passes for
+    noise where the noise is estimated from roughness.
     """
+    problem = pool.problem
     values = space.as_dict(space.from_unit(unit))
-    nudged = {name: value * (1 + NUDGE) for name, value in values.items()}
-    plain, moved = pool.map([Task(values, recording), Task(nudged, recording)])
+    plain = next(iter(pool.map([Task(values, problem.fit_on[0])])))
+    if not isinstance(plain, Trajectory):
+        return [f"the best fit cannot be simulated: {plain.reason}"]
     out: list[str] = []
-    for what, outcome in (("the best fit", plain), ("the best fit, moved by one part in 10^9,", moved)):
-        if not isinstance(outcome, Trajectory):
-            return [f"{what} cannot be simulated: {outcome.reason}"]
-    assert isinstance(plain, Trajectory) and isinstance(moved, Trajectory)
-    shift = float(np.sqrt(np.mean((plain.series.points - moved.series.points) ** 2)))
-    if shift > 0.3 * noise.sd:
+    rough = roughness(pool, space, unit, problem.fit_on)
+    if failing := [n for n in problem.fit_on if n not in rough]:
+        out.append(f"close to the best fit {', '.join(failing)} cannot be simulated, so ± means little")
+    if loose := unrepeatable(rough, problem.recordings, noise):
         out.append(
-            f"the simulation is chaotic: changing the parameters by one part in 10^9 moves it by {1e3 * shift:.1f} mm, "
-            "so ± means little; set [material] damping_time = 0.005 or lower [simulator] time_step"
+            "the simulation is chaotic: next to nothing in the parameters moves "
+            + "; ".join(loose)
+            + "; what it does there is chance and does not count. Where chance does not decide in reality, "
+            "set [material] damping_time = 0.005 or lower [simulator] time_step"
         )
     if noise.source.startswith("roughness"):
-        rough = np.diff(plain.series.points, n=4, axis=0) / np.sqrt(70.0)
-        own = float(1.4826 * np.median(np.abs(rough)))
+        rough_in_time = np.diff(plain.series.points, n=4, axis=0) / np.sqrt(70.0)
+        own = float(1.4826 * np.median(np.abs(rough_in_time)))
         if own > 0.5 * noise.sd:
             out.append(
                 "the motion is fast for the frame rate and passes for noise, which is overestimated; "

@@ -10,10 +10,12 @@ from ...core.parameters import ParameterSpace
 from ...core.series import PointSeries
 from ...core.store import storage_errors
 from ...core.study import SimulationPool, Study, Task
+from ..discrepancy import NONE, Discrepancy
 from ..noise import Noise, estimate_noise
 from ..observe import Observer
-from ..polish import Objective, polish_from
+from ..polish import Objective, Polished, polish_from
 from ..residuals import Offsets, residual
+from ..roughness import chance_of, roughness
 from .bounds import at_bounds, bound_notes
 from .doubts import doubts
 from .draws import ABSENT, FAILED, WHOLE, DrawStore
@@ -67,10 +69,8 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
                 break
             proposals.add(posterior, *store.tried(upto))
         study.progress("polishing the best draw by least squares", 0, 0)
-        objective = Objective(pool, space, problem.fit_on, noise, offsets_of(study))
         before = pool.count
-        best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto))
-        found = doubts(pool, space, best.unit, problem.fit_on[0], noise)
+        best, found = _polished(study, pool, store, noise, takes, upto)
         simulations = upto * len(takes.simulated) + pool.count - before
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
     # what the model leaves unexplained makes the estimate that much less certain
@@ -97,6 +97,21 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
     return load_fit(study)
 
 
+def _polished(
+    study: Study, pool: SimulationPool, store: DrawStore, noise: Noise, takes: Takes, upto: int
+) -> tuple[Polished, list[str]]:
+    """The best fit, and what makes it doubtful."""
+    problem, offsets = study.problem, offsets_of(study)
+    space, names = problem.space, problem.fit_on
+    nearest = _draws_in_order(study, store, noise, takes, upto, NONE)[0]
+    # what cannot be repeated there must not lead the fit
+    rough = roughness(pool, space, nearest, names)
+    discrepancy = Discrepancy(chance=chance_of(rough, problem.recordings, noise, offsets))
+    objective = Objective(pool, space, names, noise, offsets, discrepancy=discrepancy)
+    best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto, discrepancy))
+    return best, doubts(pool, space, best.unit, noise)
+
+
 def physical_sd(space: ParameterSpace, unit: FloatArray, covariance: FloatArray) -> FloatArray:
     """Standard deviations ``(D,)`` [units] from a covariance in the unit cube, to first order."""
     step = 1e-4
@@ -119,7 +134,9 @@ def _simulate(study: Study, pool: SimulationPool, store: DrawStore, proposal: Fl
         study.progress(title, count - len(missing) + done + 1, count)
 
 
-def _draws_in_order(study: Study, store: DrawStore, noise: Noise, takes: Takes, upto: int) -> FloatArray:
+def _draws_in_order(
+    study: Study, store: DrawStore, noise: Noise, takes: Takes, upto: int, discrepancy: Discrepancy
+) -> FloatArray:
     """Whole draws ``(N, D)`` in the unit cube, the one that comes nearest to the measurement first."""
     problem = study.problem
     theta, points, _ = store.read(upto)
@@ -128,7 +145,7 @@ def _draws_in_order(study: Study, store: DrawStore, noise: Noise, takes: Takes, 
         recording = problem.recordings[name]
         for k, p in enumerate(points[store.recordings.index(takes.of(name))]):
             series = PointSeries(recording.series.time, p, recording.series.unit, recording.series.correspondence)
-            white = residual(recording, series, noise, offsets_of(study)).white
+            white = discrepancy.whitened(name, residual(recording, series, noise, offsets_of(study)).white)
             total[k] += float(white @ white)
     return np.asarray(theta[np.argsort(total, kind="stable")])
 

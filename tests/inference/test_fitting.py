@@ -17,8 +17,6 @@ from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreE
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
-from muslin.inference.noise import Noise
-from muslin.inference.sequential.doubts import doubts
 from muslin.inference.sequential.only_one import only_one
 
 pytest.importorskip("mujoco")
@@ -164,17 +162,3 @@ def test_two_fits_of_one_study_do_not_mix(small_study: Study) -> None:
     with only_one(small_study.results_path), pytest.raises(MuslinError, match="another fit"):
         small_study.fit()
     assert small_study.fit().failed == 0
-
-
-def test_chaos_is_said(tmp_path: Path) -> None:
-    """Undamped cloth on an explicit engine feels a change in the ninth digit; the noise says whether it matters."""
-    pytest.importorskip("pybullet")
-    path = write_study(tmp_path, small_measurement(), fit_on=["far"], hold_out=[])
-    path.write_text(path.read_text().replace('"mujoco"', '"pybullet"').replace("time_step = 0.01", "time_step = 0.005"))
-    study = Study.load(path, workers=1)
-    space, noise = study.problem.space, Noise(1e-9, 0.0, "test", "m", 0.01)
-    with study.pool() as pool:
-        said = doubts(pool, space, np.full(len(space), 0.5), "far", noise)
-    assert any("chaotic" in s for s in said)
-    with study.pool() as pool:
-        assert not doubts(pool, space, np.full(len(space), 0.5), "far", Noise(1.0, 0.0, "test", "m", 0.01))

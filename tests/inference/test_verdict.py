@@ -21,7 +21,7 @@ def candidate(
 ) -> Candidate:
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
     white = np.full(int(COUNT), np.sqrt(rss / COUNT))
-    fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, 1.0)
+    fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, COUNT)
     return Candidate(name, space, 1, fit, {"other": held_out}, (held_out / 0.003) ** 2, numerics)
 
 

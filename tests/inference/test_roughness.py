@@ -1,0 +1,59 @@
+"""What a simulation cannot repeat: found where it is, and neither fitted, nor counted, nor taken for information."""
+
+import numpy as np
+import pytest
+from buckling import LANDED, buckling_study
+
+from muslin.inference.discrepancy import Discrepancy
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, polish
+from muslin.inference.residuals import Offsets
+from muslin.inference.roughness import chance_of, roughness, unrepeatable
+from muslin.inference.sequential.doubts import doubts
+
+NOISE = Noise(0.001, 0.0, "test", "m", 0.01)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):  # type: ignore[no-untyped-def]
+    return buckling_study(tmp_path_factory.mktemp("buckling"))
+
+
+def test_it_begins_where_the_rope_buckles(study) -> None:  # type: ignore[no-untyped-def]
+    problem = study.problem
+    middle = np.full(len(problem.space), 0.5)
+    with study.pool() as pool:
+        rough = roughness(pool, problem.space, middle, problem.fit_on)
+        said = doubts(pool, problem.space, middle, NOISE)
+    time = problem.recordings["down"].series.time
+    assert rough["up"].max() < 0.1 * NOISE.sd
+    assert rough["down"][time < LANDED].max() < 0.1 * NOISE.sd
+    assert rough["down"].max() > 3 * NOISE.sd
+    assert len(said) == 1 and "chaotic" in said[0] and "down from" in said[0] and "up" not in said[0].split("from")[0]
+    (where,) = unrepeatable(rough, problem.recordings, NOISE)
+    assert where.startswith("down from 0.")
+
+
+def test_a_fit_leaves_it_out(study) -> None:  # type: ignore[no-untyped-def]
+    problem = study.problem
+    unit = np.full(len(problem.space), 0.5)
+    with study.pool() as pool:
+        rough = roughness(pool, problem.space, unit, ["down"])
+        chance = chance_of(rough, problem.recordings, NOISE, Offsets())
+        plain = Objective(pool, problem.space, ["down"], NOISE, Offsets())
+        aware = Objective(pool, problem.space, ["down"], NOISE, Offsets(), discrepancy=Discrepancy(chance=chance))
+        blind, sees = polish(plain, unit + 0.003, 1), polish(aware, unit + 0.003, 1)
+    assert blind.rss > 3 * blind.count  # at the truth but for a nudge
+    assert sees.rss < 1.1 * sees.count < blind.count
+    assert np.sqrt(np.diag(sees.covariance)).max() > 10 * np.sqrt(np.diag(blind.covariance)).max()
+
+
+def test_residuals_are_weighed_by_what_is_known_of_chance() -> None:
+    rng = np.random.default_rng(0)
+    v = np.array([0.0, 0.5, 4.0])
+    d = Discrepancy(chance={"fling": v})
+    draws = np.stack([d.whitened("fling", w) for w in rng.normal(size=(4000, 3)) * np.sqrt(1 + v)])
+    np.testing.assert_allclose(draws.var(axis=0), [1.0, 1.0, 0.0], rtol=0.1)
+    assert d.dropped(["fling", "other"]) == 1
+    assert d.left_to_chance(["fling"]) == pytest.approx(1 / 3)
+    assert d.left_to_chance(["other"]) == 0.0
