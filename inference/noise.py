@@ -13,6 +13,8 @@ from ..core.study import Problem
 
 #: Largest clock offset between repeats that is looked for [s].
 _LARGEST_SHIFT = 0.03
+#: No noise of repeats is taken to be more correlated from frame to frame.
+_SLOWEST = 0.98
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
     if estimates:
         variance, ar1, count = (np.array(x) for x in zip(*estimates, strict=True))
         sd = float(np.sqrt(np.average(variance, weights=count)))
-        correlation = float(np.clip(np.average(ar1, weights=count), 0.0, 0.98))
+        correlation = float(np.clip(np.average(ar1, weights=count), 0.0, _SLOWEST))
         takes = len({r.name for pair in pairs for r in pair})
         independent = count.sum() * min(1.0, takes / 2 / len(pairs)) * (1 - correlation) / (1 + correlation)
         source = f"{takes} takes that are repeats"
@@ -123,4 +125,8 @@ def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None
     both = np.isfinite(d[1:]) & np.isfinite(d[:-1])
     covariance = float(np.mean(d[1:][both] * d[:-1][both])) if both.any() else 0.0
     ar1 = (covariance / max(variance, 1e-300) - mixing) / 2
+    if ar1 > 0:  # the constant takes more from slow noise: Kendall 1954, and the variance of the mean of an AR(1)
+        frames = len(d)
+        ar1 = min(ar1 + (1 + 3 * ar1) / frames, _SLOWEST)
+        variance /= lost * max(1 - (1 + ar1) / (1 - ar1) / frames, 0.5)
     return variance, ar1, int(np.isfinite(d).sum())

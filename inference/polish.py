@@ -145,12 +145,47 @@ class Objective:
         return columns
 
 
-def polish(objective: Objective, start: FloatArray, evaluations: int = 12) -> Polished:
-    """Bounded least squares (trust region reflective) from ``start`` in the unit cube."""
+class _Secants:
+    """Derivatives by differences once, and then from where the search goes (Broyden, 1965)."""
+
+    def __init__(self, objective: Objective, known: FloatArray | None) -> None:
+        self._objective, self._jacobian = objective, known
+        self._at: tuple[FloatArray, FloatArray] | None = None
+
+    def __call__(self, unit: FloatArray) -> FloatArray:
+        white = self._objective.one(unit)
+        if self._jacobian is None:
+            self._jacobian = self._objective.jacobian(unit)
+        elif self._at is not None:
+            step = unit - self._at[0]
+            missed = white - self._at[1] - self._jacobian @ step
+            self._jacobian = self._jacobian + np.outer(missed, step) / max(float(step @ step), 1e-12)
+        self._at = (unit.copy(), white)
+        return self._jacobian
+
+
+def polish(
+    objective: Objective,
+    start: FloatArray,
+    evaluations: int = 12,
+    *,
+    known: FloatArray | None = None,
+    roughly: bool = False,
+) -> Polished:
+    """Bounded least squares (trust region reflective) from ``start`` in the unit cube.
+
+    Args:
+        objective: to make least.
+        start: ``(D,)``.
+        evaluations: at most, derivatives not counted.
+        known: Jacobian at ``start`` ``(N, D)``, if there is one already; only with ``roughly``.
+        roughly: take no more derivatives by differences than at the start, for an unfinished search: a fraction of
+            the rollouts, and a curvature that is not to be relied on.
+    """
     result = least_squares(
         objective.one,
         np.clip(start, 1e-4, 1 - 1e-4),
-        jac=objective.jacobian,
+        jac=_Secants(objective, known) if roughly else objective.jacobian,
         bounds=(0.0, 1.0),
         x_scale=0.1,
         ftol=1e-4,

@@ -189,7 +189,7 @@ class DiagnoseTable(_Table):
 
     candidates: list[str] | None = None
     draws: int = Field(default=16, ge=4)
-    simulations: int = Field(default=1500, ge=100)
+    simulations: int = Field(default=1000, ge=100)
 
 
 class StudyConfig(_Table):

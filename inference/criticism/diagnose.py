@@ -139,7 +139,7 @@ def _result(
         "unrepeatable": unrepeatable(work.rough, problem.recordings, work.fit.noise),
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,
-        "budget_spent": work.spent,
+        "budget_spent": work.cut_short,
         "seconds": seconds,
         "seed": study.config.study.seed,
     }

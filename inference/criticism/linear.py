@@ -11,6 +11,10 @@ from ..polish import Objective, Polished
 
 #: How far a coefficient is moved from zero [of its prior range]: far enough that effects with a threshold show.
 STEP = 0.1
+#: A coefficient that does nothing then is moved this far.
+FAR_STEP = 0.9
+#: A response this much larger than the misfit, or smaller, is looked at in smaller steps, or larger ones.
+FAR_OFF = 3.0
 #: No solution is nearer to a face of the unit cube.
 _EDGE = 0.01
 
@@ -26,6 +30,7 @@ class Look:
         jacobian: of the white residuals ``(N, D)``.
         at: where the linear model of the residuals has its least square inside the cube ``(D,)``.
         rss: that square [noise variances].
+        reach: how much the largest response to a moved coefficient is, in units of the misfit.
     """
 
     name: str
@@ -34,6 +39,26 @@ class Look:
     jacobian: FloatArray
     at: FloatArray
     rss: float
+    reach: float
+
+    @property
+    def scale(self) -> FloatArray:
+        """Points ``(K, D)`` of another size of the coefficients, along those of :attr:`at`.
+
+        An effect with a threshold (a grasp that slips, a yield) does nothing below it and everything above, which a
+        derivative does not tell.
+        """
+        if 1.0 / FAR_OFF < self.reach < FAR_OFF:
+            return np.zeros((0, len(self.start)))
+        along = (self.at - self.start)[self.base :]
+        if not along.any():
+            along = np.where(self.start[self.base :] > 0.5, -1.0, 1.0)
+        # a linear effect would be as large as the misfit at STEP / reach; one with a threshold is somewhere between
+        powers = (0.25, 0.5) if self.reach >= FAR_OFF else (0.5, 1.0)
+        steps = np.minimum(STEP / np.maximum(self.reach, STEP) ** np.array(powers), 1.0)
+        points = np.repeat(self.start[None], len(steps), axis=0)
+        points[:, self.base :] += steps[:, None] * along / np.abs(along).max()
+        return np.asarray(np.clip(points, 0.0, 1.0))
 
     @property
     def responds(self) -> bool:
@@ -62,16 +87,20 @@ def look_at(name: str, objective: Objective, plain: Polished) -> Look:
     space, base = objective.space, len(plain.unit)
     zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(space)[base:]])
     start = np.concatenate([plain.unit, zero])
-    steps = np.where(zero + STEP <= 1.0, STEP, -STEP)
-    moved = np.repeat(start[None], len(zero), axis=0)
-    moved[np.arange(len(zero)), base + np.arange(len(zero))] += steps
-    columns = np.zeros((len(plain.white), len(zero)))
-    for k, row in enumerate(objective.many(moved)):
-        if row is not None:
-            columns[:, k] = (row - plain.white) / steps[k]
+    for size in (STEP, FAR_STEP):
+        steps = np.where(zero + size <= 1.0, size, -np.minimum(size, zero))
+        moved = np.repeat(start[None], len(zero), axis=0)
+        moved[np.arange(len(zero)), base + np.arange(len(zero))] += steps
+        columns = np.zeros((len(plain.white), len(zero)))
+        for k, row in enumerate(objective.many(moved)):
+            if row is not None:
+                columns[:, k] = (row - plain.white) / steps[k]
+        if columns.any():
+            break
     jacobian = np.hstack([plain.jacobian, columns])
     at, rss = least_square(start, plain.white, jacobian)
-    return Look(name, space, start, jacobian, at, rss)
+    reach = float(np.max(np.linalg.norm(columns * steps, axis=0)) / np.sqrt(plain.rss))
+    return Look(name, space, start, jacobian, at, rss, reach)
 
 
 def least_square(unit: FloatArray, white: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, float]:

@@ -100,45 +100,54 @@ class _Tournament:
         acting = sorted((n for n, look in self.looks.items() if look.responds), key=lambda n: self.looks[n].rss)
         for k, name in enumerate(acting):
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
-            found[name] = self.screened(found[name], FEW_POINTS, self.looks[name].at)
+            found[name] = self.screened(found[name], FEW_POINTS, self.looks[name])
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             self.work.study.progress(f"trying {name}", 0, 0)
-            found[name] = self.polished(self.screened(found[name], self.points - FEW_POINTS), FIRST_EVALUATIONS)
+            found[name] = self.approached(self.screened(found[name], self.points - FEW_POINTS), FIRST_EVALUATIONS)
         tried = {n: found[n] for n in acting}
         goals = {n: least_square(c.fit.unit, c.fit.white, c.fit.jacobian) for n, c in tried.items()}
         for name in _leaders({n: c.rss for n, c in tried.items()}, {n: g[1] for n, g in goals.items()}, CONTENDERS):
             self.work.study.progress(f"looking closer at {name}", 0, 0)
             # steps of a bounded search from near a bound are short; this looks at what lies behind them
             there = self.moved(found[name], goals[name][0][None])
-            found[name] = self.polished(there, CONTENDER_EVALUATIONS)
+            found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         order = sorted(found.values(), key=lambda c: c.rank)
         half = (self.plain.rss + order[0].rss) / 2
         for k, c in enumerate(order):
-            if k < FINALISTS or c.rss < half:
+            if (k < FINALISTS or c.rss < half) and self.work.may_go_on():
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
-                found[c.name] = self.polished(c, MORE_EVALUATIONS)
+                fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
+                found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
         return [found[name] for name in self.looks]
 
-    def screened(self, candidate: Candidate, count: int, at: FloatArray | None = None) -> Candidate:
-        """The best of the candidate and of points that fill its prior, or lie ``at (D,)``."""
+    def screened(self, candidate: Candidate, count: int, look: Look | None = None) -> Candidate:
+        """The best of the candidate and of ``count`` points: those that a look tells, others that fill its prior."""
         base = len(self.plain.unit)
         starts = self.plain.unit[None]
         if not self.effects:
             starts = np.vstack([starts, self.work.starts])
         points = screening_points(candidate.space, base, starts, count, self.rng[candidate.name])
-        return self.moved(candidate, points if at is None else np.vstack([at, points]))
+        if look is not None:
+            points = np.vstack([look.at, look.scale, points])[: count + 1]
+        return self.moved(candidate, points)
 
     def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
-        if self.work.spent:
+        if not self.work.may_go_on():
             return candidate
         best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
         if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
             return candidate
         return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]))
 
-    def polished(self, candidate: Candidate, evaluations: int) -> Candidate:
-        fit = self.work.polished((*self.effects, candidate.name), candidate.fit.unit, evaluations)
+    def approached(self, candidate: Candidate, evaluations: int) -> Candidate:
+        """Some way towards the least square; derivatives are those of an earlier approach to the same point."""
+        if not self.work.may_go_on():
+            return candidate
+        seen_only = candidate.fit.jacobian is self.looks[candidate.name].jacobian
+        known = None if seen_only else candidate.fit.jacobian
+        effects = (*self.effects, candidate.name)
+        fit = self.work.roughly_polished(effects, candidate.fit.unit, evaluations, known)
         return replace(candidate, fit=min(fit, candidate.fit, key=lambda p: p.rss))
 
 
@@ -154,7 +163,7 @@ def _again(work: Work, stage: Stage) -> Stage:
     Only once the verdict stands: of all candidates the leader alone would have it easier than its rivals.
     """
     c = stage.chosen
-    if stage.evidence.left(c) == 0.0 or work.spent:
+    if stage.evidence.left(c) == 0.0 or not work.may_go_on():
         return stage
     effects = (*stage.effects, c.name)
     rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])

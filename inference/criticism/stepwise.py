@@ -55,7 +55,7 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
 
 def _forward(work: Work, names: list[str], found: Findings) -> Findings:
     """Add effects as long as one is named; whether there is a misfit left to look into, each stage says itself."""
-    while len(found.effects) < MOST_EFFECTS and not work.spent:
+    while len(found.effects) < MOST_EFFECTS and work.may_go_on():
         rest = [n for n in names if n not in found.effects]
         if not rest:
             break
@@ -77,7 +77,7 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
     leads = [c for c in sorted(e.candidates, key=lambda c: c.rank) if e.explained(c) > LEADING and e.z(c) > SIGNIFICANT]
     for lead in leads[:LEADS]:
         rest = [n for n in names if n != lead.name]
-        if work.spent or not rest:
+        if not work.may_go_on() or not rest:
             return None
         stage = run_stage(work, (lead.name,), rest, lead.fit.unit)
         if stage.decision.verdict == "named" and work.jointly(first.plain, stage.chosen).accounted(stage.chosen):

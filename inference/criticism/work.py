@@ -30,6 +30,7 @@ class Work:
         discrepancy: how far the model's own numbers may be off, as last seen.
         rough: what it cannot repeat, a frame ``(T,)`` [m or px], by recording, as last seen.
         limit: of rollouts.
+        cut_short: whether something was left out for want of them.
     """
 
     def __init__(self, study: Study, problem: Problem, pool: SimulationPool, fit: FitResult) -> None:
@@ -37,6 +38,7 @@ class Work:
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
         self.limit = study.config.diagnose.simulations
+        self.cut_short = False
         self.discrepancy = NONE
         self.rough: dict[str, FloatArray] = {}
         self._elsewhere = 0  # rollouts of other engines and meshes
@@ -47,10 +49,11 @@ class Work:
         """Rollouts so far."""
         return self.pool.count + self._elsewhere
 
-    @property
-    def spent(self) -> bool:
-        """Is the budget used up?"""
-        return self.count >= self.limit
+    def may_go_on(self) -> bool:
+        """Is something left of the budget? That it was not, once, is remembered: :attr:`cut_short`."""
+        left = self.count < self.limit
+        self.cut_short |= not left
+        return left
 
     def space(self, effects: tuple[str, ...]) -> ParameterSpace:
         return self.problem.with_effects(*effects).space
@@ -77,6 +80,12 @@ class Work:
         objective = self.objective(effects)
         each = (1 + len(objective.space)) * len(self.problem.fit_on)
         return polish(objective, start, max(1, min(evaluations, (self.limit - self.count) // each)))
+
+    def roughly_polished(
+        self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None
+    ) -> Polished:
+        """The same with few derivatives; see :func:`~..polish.polish`."""
+        return polish(self.objective(effects), start, evaluations, known=known, roughly=True)
 
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
         """Hold out, and put together what decides between candidates for the model that has ``effects``."""

@@ -7,9 +7,11 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.errors import MuslinError
 from ...core.parameters import ParameterSpace
+from ...core.rollout import Trajectory
 from ...core.series import PointSeries
 from ...core.store import storage_errors
 from ...core.study import SimulationPool, Study, Task
+from ..correlated_noise import correlated_noise
 from ..discrepancy import NONE, Discrepancy
 from ..noise import Noise, estimate_noise
 from ..observe import Observer
@@ -40,8 +42,7 @@ def fit(study: Study) -> FitResult:
     """Fit a study: continue from the draws that its store has, or return the finished result."""
     problem, config = study.problem, study.config
     noise = estimate_noise(problem, config.noise.sd)
-    recordings = [problem.recordings[r] for r in problem.fit_on]
-    takes = Takes(Observer(recordings, noise, offsets_of(study)), problem.scenarios)
+    takes = _takes(study, noise)
     make_estimator(study, takes.correspondence)  # a wrong name or option is said now
     with only_one(study.results_path):
         return _fit(study, noise, takes)
@@ -71,6 +72,13 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
         study.progress("polishing the best draw by least squares", 0, 0)
         before = pool.count
         best, found = _polished(study, pool, store, noise, takes, upto)
+        truer = correlated_noise(noise, _residuals(study, pool, best, noise))
+        if truer is not noise:
+            study.progress("learning again: the noise is correlated in time", 0, 0)
+            noise, takes = truer, _takes(study, truer)
+            learner = Learner(study, takes)
+            posterior = learner.learn(theta, points, numbers, proposals, k)
+            best, found = _polished(study, pool, store, noise, takes, upto)
         simulations = upto * len(takes.simulated) + pool.count - before
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
     # what the model leaves unexplained makes the estimate that much less certain
@@ -95,6 +103,25 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
     with storage_errors(study.results_path):
         save_result(store.group, study, posterior, samples, learner.log_weights, best, sd, noise, about)
     return load_fit(study)
+
+
+def _takes(study: Study, noise: Noise) -> Takes:
+    problem = study.problem
+    recordings = [problem.recordings[r] for r in problem.fit_on]
+    return Takes(Observer(recordings, noise, offsets_of(study)), problem.scenarios)
+
+
+def _residuals(study: Study, pool: SimulationPool, best: Polished, noise: Noise) -> list[FloatArray]:
+    """Measured minus predicted ``(T, P, A)`` of every fitted recording with correspondence that can be simulated."""
+    problem = study.problem
+    values = problem.space.as_dict(problem.space.from_unit(best.unit))
+    recordings = [problem.recordings[n] for n in problem.fit_on if problem.recordings[n].series.correspondence]
+    outcomes = pool.map([Task(values, r.name) for r in recordings])
+    return [
+        residual(r, o.series, noise, offsets_of(study)).difference
+        for r, o in zip(recordings, outcomes, strict=True)
+        if isinstance(o, Trajectory)
+    ]
 
 
 def _polished(

@@ -16,8 +16,8 @@ from muslin.plugins.effects.command import ActuatorLag
 pytest.importorskip("mujoco")
 
 SCHEMA = {
-    "verdict", "effects", "further", "candidates", "error", "evidence", "where", "told", "simulations", "budget_spent",
-    "seconds", "seed",
+    "verdict", "effects", "further", "candidates", "error", "evidence", "unrepeatable", "where", "told", "simulations",
+    "budget_spent", "seconds", "seed",
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",

@@ -1,0 +1,128 @@
+"""Noise that is correlated in time, told from one take: it is what markers do not share.
+
+Slow noise passes for motion in every difference over time, so that roughness makes it too small, and a right model
+would show a misfit. But noise is each marker's own, while what a model misses moves neighbours together: once the
+leading singular directions are taken off the residuals, as many as stand out of independent noise (parallel analysis:
+Horn 1965, with AR(1) noise as the reference), noise is what is left.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from ..core.arrays import FloatArray
+from .noise import Noise
+
+#: Below this correlation from frame to frame noise is taken for white, which roughness tells better.
+WHITE = 0.4
+#: A recording needs as many frames, and coordinates of markers, to tell.
+_FRAMES, _COLUMNS = 20, 12
+#: Correlations that are tried.
+_GRID = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.9, 0.95])
+#: Simulated noise to compare with, and the quantile of its leading direction that stands out.
+_REPLICATES, _QUANTILE = 60, 0.99
+#: How far the spread of what is left may be off from what the roughness of the same residuals says, and from what a
+#: person has said [relative].
+_AGREE, _AGREE_TOLD = 0.2, 0.25
+#: Directions that are taken off beyond those that stand out: slow noise hides slow misfit.
+_MORE = 2
+#: No standard deviation is known better, as slow noise and a slow misfit look alike [relative].
+_ERROR = 0.1
+
+
+@dataclass(frozen=True)
+class _Own:
+    """What markers do not share in one recording: standard deviation, correlation, and how many numbers told it."""
+
+    sd: float
+    ar1: float
+    count: int
+
+
+def correlated_noise(noise: Noise, residuals: Sequence[FloatArray]) -> Noise:
+    """``noise``, or what is left in the residuals if that is correlated in time.
+
+    Args:
+        noise: so far; one that repeats have told stays.
+        residuals: of the best fit, ``(T, P, A)`` a recording with correspondence [unit]; NaN = not seen.
+    """
+    if noise.ar1 > 0 or noise.source.endswith("repeats"):
+        return noise
+    rng = np.random.default_rng(67)
+    found = [own for own in (_own(r, rng) for r in residuals) if own is not None]
+    if not found:
+        return noise
+    weights = [own.count for own in found]
+    sd = float(np.sqrt(np.average([own.sd**2 for own in found], weights=weights)))
+    ar1 = float(np.average([own.ar1 for own in found], weights=weights))
+    told = not noise.source.startswith("roughness")
+    if ar1 < WHITE or (told and abs(sd / noise.sd - 1) > _AGREE_TOLD):
+        return noise
+    source = f"{noise.source}, and what markers do not share: correlated, {ar1:.2f} from frame to frame"
+    if told:
+        return replace(noise, ar1=ar1, source=source)
+    independent = sum(weights) * (1 - ar1) / (1 + ar1)
+    return replace(noise, sd=sd, ar1=ar1, source=source, relative_error=float(np.hypot(_ERROR, independent**-0.5)))
+
+
+def _own(residual: FloatArray, rng: np.random.Generator) -> _Own | None:
+    """None if nothing that is left looks like independent noise."""
+    x = _filled(residual)
+    if x.shape[0] < _FRAMES or x.shape[1] < _COLUMNS:
+        return None
+    rough = 1.4826 * float(np.median(np.abs(np.diff(x, n=4, axis=0)))) / np.sqrt(70.0)
+    u, s, vt = np.linalg.svd(x, full_matrices=False)
+    enough = None
+    for shared in range(len(s) // 2):
+        off = (u[:, :shared], vt[:shared])
+        left = (u[:, shared:] * s[shared:]) @ vt[shared:]
+        lags = [np.mean([_lag(_noise(x.shape, a, off, rng)) for _ in range(2)]) for a in _GRID]
+        if _lag(left) > lags[-1]:
+            continue  # too slow for noise
+        ar1 = float(np.interp(_lag(left), lags, _GRID))
+        replicates = [_noise(x.shape, ar1, off, rng) for _ in range(_REPLICATES)]
+        total = float(np.sum(left**2))
+        sd = float(np.sqrt(total / np.mean([np.sum(e**2) for e in replicates])))
+        if enough is None:
+            leading = [np.linalg.norm(e, 2) ** 2 / np.sum(e**2) for e in replicates]
+            agrees = abs(sd * _roughness_of(ar1) / rough - 1) < _AGREE
+            enough = shared if agrees and s[shared] ** 2 / total <= np.quantile(leading, _QUANTILE) else None
+        if enough is not None and shared >= enough + _MORE:
+            return _Own(sd, ar1, int(np.isfinite(residual).sum()))
+    return None
+
+
+def _filled(residual: FloatArray) -> FloatArray:
+    """Coordinates as columns ``(T, C)``; gaps are bridged, what is seen less than half of the time is left out."""
+    x = residual.reshape(len(residual), -1)
+    frames = np.arange(len(x))
+    columns = []
+    for column in x.T:
+        seen = np.isfinite(column)
+        if 2 * seen.sum() > len(x):
+            columns.append(np.interp(frames, frames[seen], column[seen]))
+    return np.array(columns).T if columns else np.zeros((len(x), 0))
+
+
+def _noise(
+    shape: tuple[int, ...], ar1: float, off: tuple[FloatArray, FloatArray], rng: np.random.Generator
+) -> FloatArray:
+    """AR(1) noise of unit variance without the directions ``off`` in time ``(T, K)`` and over columns ``(K, C)``."""
+    wild = rng.normal(size=shape)
+    wild[1:] *= np.sqrt(1 - ar1**2)
+    made = np.asarray(lfilter([1.0], [1.0, -ar1], wild, axis=0), float)
+    made -= off[0] @ (off[0].T @ made)
+    return np.asarray(made - (made @ off[1].T) @ off[1])
+
+
+def _lag(x: FloatArray) -> float:
+    """Correlation from frame to frame."""
+    return float(np.sum(x[1:] * x[:-1]) / np.sqrt(np.sum(x[1:] ** 2) * np.sum(x[:-1] ** 2)))
+
+
+def _roughness_of(ar1: float) -> float:
+    """Standardised fourth difference of AR(1) noise of unit variance."""
+    weights = np.correlate([1.0, -4.0, 6.0, -4.0, 1.0], [1.0, -4.0, 6.0, -4.0, 1.0], "full")
+    return float(np.sqrt(np.sum(weights * ar1 ** np.abs(np.arange(-4, 5))) / 70.0))
