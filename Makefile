@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
 .PHONY: demo test lint bench bench-calibration bench-effects bench-hidden-small bench-inference bench-material bench-paper \
-	bench-proposals bench-sets bench-sim clean
+	bench-proposals bench-real bench-sets bench-sim clean
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -64,6 +64,10 @@ bench-calibration: $(VENV)/.ready
 
 bench-proposals: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/proposals.py
+
+# real recordings: those in the repository, and those in the folder MUSLIN_DATA; REAL="--only 'cable 1'" for a part
+bench-real: $(VENV)/.ready
+	$(BIN)/python tests/benchmarks/real.py $(REAL)
 
 bench-sets: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/sets.py

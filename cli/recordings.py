@@ -1,5 +1,6 @@
 """``muslin import``: files of other programs to one measurement."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,10 +9,12 @@ from typing import Annotated, TypeVar
 import numpy as np
 import typer
 
+from ..core.dataset import Dataset, DatasetNote, cropped
 from ..core.errors import InputError
 from ..core.importing import ImportOptions, import_file
 from ..core.measurement import Measurement, Recording
 from ..core.measurement_store import save_measurement
+from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS
 from .console import command, next_step, say
 
@@ -70,6 +73,13 @@ def import_files(
             help="Whether a point is the same spot of the object in every frame; default what the file says, else yes.",
         ),
     ] = None,
+    dataset: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="FILE is a file or folder of this published set; see: muslin plugins"),
+    ] = None,
+    take: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="With --dataset: a take to read; default all of them.")
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a measurement that is there already.")] = False,
 ) -> None:
     """Import recorded points: several files become several recordings of one measurement.
@@ -81,12 +91,28 @@ def import_files(
 
     CSV, one row an observation: columns time,point,x,y and optionally z, recording; a missing row is a
     point not seen.
+
+    A published set (--dataset): all of its takes or those named, with --start and --stop once or once a take.
     """
     if output.exists() and not force:  # said before a long file is read
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
     options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
     recordings: list[Recording] = []
-    for k, file in enumerate(files):
+    if dataset is not None:
+        known: dict[str, object] = {
+            "--name": name,
+            "--motion": motion,
+            "--load": load,
+            "--gripper": gripper,
+            "--unit": unit,
+        }
+        known |= {"--up": up != "z", "--correspondence": correspondence is not None}
+        if wrong := [option for option, given in known.items() if given]:
+            raise InputError(f"{wrong[0]} does not go with --dataset, which knows that itself; leave it out")
+        recordings = _of_dataset(dataset, files, take or [], start, stop)
+    elif take:
+        raise InputError("--take names takes of a published set; say which set with --dataset")
+    for k, file in enumerate(files if dataset is None else []):
         own = replace(
             options,
             start=_each(start, k, files, "--start"),
@@ -108,6 +134,31 @@ def import_files(
     )
 
 
+def _of_dataset(
+    name: str, files: Sequence[Path], takes: Sequence[str], start: list[float] | None, stop: list[float] | None
+) -> list[Recording]:
+    """Takes of a published set, cropped; what its reader left out is said."""
+    if len(files) != 1:
+        raise InputError(f"--dataset reads one file or folder, but {len(files)} are named; import them one by one")
+    read: Dataset = REGISTRY.get("dataset", name)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", DatasetNote)
+        recordings = read(files[0], takes)
+    for warning in caught:
+        if issubclass(warning.category, DatasetNote):
+            say(str(warning.message))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    for option, values in (("--start", start), ("--stop", stop)):
+        if values and len(values) not in (1, len(recordings)):
+            raise InputError(f"{option} is given {len(values)} times for {len(recordings)} takes; once, or once a take")
+    return [cropped(r, _of(start, k), _of(stop, k)) for k, r in enumerate(recordings)]
+
+
+def _of(values: Sequence[float] | None, k: int) -> float | None:
+    return None if not values else values[0] if len(values) == 1 else values[k]
+
+
 def _each(values: Sequence[T] | None, k: int, files: Sequence[Path], option: str) -> T | None:
     if not values:
         return None
@@ -127,13 +178,15 @@ def _name(names: Sequence[str] | None, k: int, files: Sequence[Path]) -> str | N
 def _summary(recording: Recording) -> str:
     series = recording.series
     frames, count, axes = series.points.shape
-    seen = float(np.mean(series.valid))
-    span = np.ptp(series.points[series.valid], axis=0)
+    seen = float(np.mean(np.isfinite(series.points).any(axis=2)))
+    measured = [a for a in range(axes) if np.isfinite(series.points[..., a]).any()]
+    span = [np.nanmax(series.points[..., a]) - np.nanmin(series.points[..., a]) for a in measured]
     extent = " x ".join(f"{s:.3g}" for s in span)
+    which = "" if len(measured) == 3 else f" ({', '.join('xyz'[a] for a in measured)})"
     parts = [
         f"{recording.name}: {frames} frames from {series.time[0]:g} to {series.time[-1]:g} s",
         f"{count} points{'' if series.correspondence else ' without correspondence'}, {seen:.1%} seen",
-        f"within {extent} {series.unit}{'' if axes == 3 else ' (x, y)'}",
+        f"within {extent} {series.unit}{which}",
     ]
     if recording.gripper is not None:
         parts.append(f"{recording.gripper.grippers} gripper(s)")

@@ -24,6 +24,7 @@ GROUPS = {
     "effect": "muslin.effects",
     "step": "muslin.steps",
     "renderer": "muslin.renderers",
+    "dataset": "muslin.datasets",
 }
 
 

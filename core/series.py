@@ -17,7 +17,7 @@ class PointSeries:
 
     Args:
         time: ``(T,)`` [s], rising.
-        points: ``(T, P, A)`` with A = 2 or 3; NaN where a point was not seen.
+        points: ``(T, P, A)`` with A = 2 or 3; NaN where a point was not seen, or a coordinate not measured.
         unit: ``"m"`` or ``"px"``.
         correspondence: true if point p is the same spot of the object in every frame and series.
     """
@@ -50,12 +50,12 @@ class PointSeries:
             )
         if self.unit not in ("m", "px"):
             raise InputError(f"unit must be 'm' or 'px', not {self.unit!r}")
-        if not self.valid.any():
+        if not np.isfinite(p).any():
             raise InputError("every point is NaN in every frame; check the columns and the marker labels")
 
     @property
     def valid(self) -> BoolArray:
-        """``(T, P)``: the point was seen."""
+        """``(T, P)``: the point was seen, in every coordinate."""
         return np.asarray(np.isfinite(self.points).all(axis=2))
 
     @property

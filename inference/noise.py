@@ -11,8 +11,8 @@ from ..core.interpolation import interpolate
 from ..core.measurement import Recording, repeats
 from ..core.study import Problem
 
-#: Largest clock offset between repeats that is looked for [s].
-_LARGEST_SHIFT = 0.03
+#: Largest clock offset between repeats that is looked for, this [s] or so many frames if they are longer.
+_LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
 #: No noise of repeats is taken to be more correlated from frame to frame.
 _SLOWEST = 0.98
 
@@ -100,11 +100,12 @@ def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None
     """
     time = a.series.time - a.series.time[0]
     other = b.series.time - b.series.time[0]
-    inside = (time >= _LARGEST_SHIFT) & (time <= other[-1] - _LARGEST_SHIFT)
+    largest = max(_LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES * float(np.median(np.diff(time))))
+    inside = (time >= largest) & (time <= other[-1] - largest)
     if inside.sum() < 8:
         return None
     best: tuple[float, FloatArray, float] | None = None
-    for shift in np.linspace(-_LARGEST_SHIFT, _LARGEST_SHIFT, 61):
+    for shift in np.linspace(-largest, largest, 61):
         when = time[inside] + shift
         d = a.series.points[inside] - interpolate(when, other, b.series.points)
         seen = np.isfinite(d)

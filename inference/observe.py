@@ -54,5 +54,5 @@ class Observer:
                 wild[t] = self.noise.ar1 * wild[t - 1] + np.sqrt(1 - self.noise.ar1**2) * wild[t]
         flawed = clean + constant + wild
         if recording.series.correspondence:
-            flawed[~recording.series.valid] = np.nan
+            flawed[~np.isfinite(recording.series.points)] = np.nan
         return np.asarray(flawed)

@@ -195,7 +195,8 @@ def polish(
     jacobian, white = np.asarray(result.jac, float), np.asarray(result.fun, float)
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
     information = objective.information(jacobian) + 12.0 * np.eye(len(start))
-    return Polished(np.asarray(result.x, float), np.linalg.inv(information), jacobian, white, objective.count(white))
+    covariance = np.asarray(np.linalg.inv(information), float)
+    return Polished(np.asarray(result.x, float), covariance, jacobian, white, objective.count(white))
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:

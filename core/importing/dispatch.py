@@ -72,6 +72,8 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
         )
     try:
         series = PointSeries(take.time, points, si, told[0] if told else True)
+        if not series.valid.any():  # a file that lacks a coordinate throughout has its columns mixed up
+            raise InputError("every point is NaN in every frame; check the columns and the marker labels")
         load = options.load if options.load is not None else (take.load or 0.0)
         return Recording(name, series, gripper, options.motion or take.motion or "", load)
     except InputError as error:

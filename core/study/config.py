@@ -95,7 +95,8 @@ class ScenarioTable(_Table):
     ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says
     in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
     first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
-    as it stands in the world at the start.
+    as it stands in the world at the start. ``start = "measured"`` lets a rope start through the markers of the first
+    frame, and says where they are on it.
     """
 
     name: str
@@ -109,6 +110,7 @@ class ScenarioTable(_Table):
     grasps: list[list[int]] | None = None
     grasp_points: list[Point | list[Point]] | None = None
     grasp_radius: float = Field(default=0.0, ge=0)
+    start: Literal["measured"] | None = None
     markers: list[int] | Literal["all", "bound"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
@@ -138,6 +140,9 @@ class ScenarioTable(_Table):
             raise ValueError("size does not go with a mesh, which has one of its own; use mesh_scale")
         if self.grasps is not None and self.grasp_points is not None:
             raise ValueError("grasps and grasp_points both say what is held; keep one of them")
+        if self.start is not None and (self.mesh is not None or self.markers is not None):
+            other = "mesh" if self.mesh is not None else "markers"
+            raise ValueError(f"start = 'measured' finds the rope and its markers itself; leave {other} out")
         if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
             raise ValueError("grasp_radius goes with grasp_points, which are missing")
         return self

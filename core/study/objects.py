@@ -15,6 +15,7 @@ from ..obstacles import Obstacle
 from ..scenario import Scenario, StartShape, bound_markers, marker_weights
 from ..scenarios import preset
 from ..scenarios.grasps import ASK, grasps_at
+from ..scenarios.measured import measured_start
 from ..scenarios.starts import GivenShape
 from .config import ScenarioTable
 
@@ -73,6 +74,8 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path) -> 
         start=start,
         settle=base.settle if table.settle is None else table.settle,
     ).for_recording(recording)
+    if table.start == "measured":
+        return measured_start(plain, recording)
     return replace(plain, markers=_markers(table.markers, plain, recording))
 
 

@@ -114,7 +114,8 @@ def _row(study: Study, held: Held, fit: FitResult, unfitted: Outcome, sets: SetV
 def carried(recording: Recording, scenario: Scenario) -> PointSeries:
     """The trivial baseline: the first measured shape, carried along by the first gripper."""
     points = recording.series.points
-    first = np.where(np.isfinite(points[0]), points[0], np.nanmedian(points, axis=0))
+    ever = np.isfinite(points).any(axis=0)
+    first = np.where(np.isfinite(points[0]), points[0], np.nanmedian(np.where(ever, points, 0.0), axis=0))
     if not scenario.grasps or scenario.motion.grippers == 0:
         moved: FloatArray = np.repeat(first[None], len(points), axis=0)
     else:

@@ -13,8 +13,6 @@ from ..polish import Objective, Polished
 STEP = 0.1
 #: A coefficient that does nothing then is moved this far.
 FAR_STEP = 0.9
-#: A response this much larger than the misfit, or smaller, is looked at in smaller steps, or larger ones.
-FAR_OFF = 3.0
 #: No solution is nearer to a face of the unit cube.
 _EDGE = 0.01
 
@@ -30,7 +28,8 @@ class Look:
         jacobian: of the white residuals ``(N, D)``.
         at: where the linear model of the residuals has its least square inside the cube ``(D,)``.
         rss: that square [noise variances].
-        reach: how much the largest response to a moved coefficient is, in units of the misfit.
+        step: how far the coefficients were moved.
+        reach: how much the largest response to that is, in units of the misfit.
     """
 
     name: str
@@ -39,26 +38,17 @@ class Look:
     jacobian: FloatArray
     at: FloatArray
     rss: float
+    step: float
     reach: float
 
-    @property
-    def scale(self) -> FloatArray:
-        """Points ``(K, D)`` of another size of the coefficients, along those of :attr:`at`.
-
-        An effect with a threshold (a grasp that slips, a yield) does nothing below it and everything above, which a
-        derivative does not tell.
-        """
-        if 1.0 / FAR_OFF < self.reach < FAR_OFF:
-            return np.zeros((0, len(self.start)))
-        along = (self.at - self.start)[self.base :]
-        if not along.any():
-            along = np.where(self.start[self.base :] > 0.5, -1.0, 1.0)
-        # a linear effect would be as large as the misfit at STEP / reach; one with a threshold is somewhere between
-        powers = (0.25, 0.5) if self.reach >= FAR_OFF else (0.5, 1.0)
-        steps = np.minimum(STEP / np.maximum(self.reach, STEP) ** np.array(powers), 1.0)
-        points = np.repeat(self.start[None], len(steps), axis=0)
-        points[:, self.base :] += steps[:, None] * along / np.abs(along).max()
-        return np.asarray(np.clip(points, 0.0, 1.0))
+    def along(self, size: float) -> FloatArray:
+        """The point ``(D,)`` whose largest coefficient is ``size`` of its range, in the direction of :attr:`at`."""
+        way = (self.at - self.start)[self.base :]
+        if not way.any():
+            way = np.where(self.start[self.base :] > 0.5, -1.0, 1.0)
+        point = self.start.copy()
+        point[self.base :] += size * way / np.abs(way).max()
+        return np.asarray(np.clip(point, 0.0, 1.0))
 
     @property
     def responds(self) -> bool:
@@ -100,7 +90,7 @@ def look_at(name: str, objective: Objective, plain: Polished) -> Look:
     jacobian = np.hstack([plain.jacobian, columns])
     at, rss = least_square(start, plain.white, jacobian)
     reach = float(np.max(np.linalg.norm(columns * steps, axis=0)) / np.sqrt(plain.rss))
-    return Look(name, space, start, jacobian, at, rss, reach)
+    return Look(name, space, start, jacobian, at, rss, size, reach)
 
 
 def least_square(unit: FloatArray, white: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, float]:

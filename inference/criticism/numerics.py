@@ -1,5 +1,6 @@
 """How far the model's own numbers may be off: directions from a finer step, a finer mesh, and another engine."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -46,12 +47,17 @@ def numerical_directions(
             variants.append((replace(problem, simulator=simulator), 1.0))
     as_it_is = _predicted(pool, values, names)
     columns: dict[str, list[FloatArray]] = {n: [] for n in names}
-    for variant, size in variants:
-        # a few rollouts: starting one more process would take longer
+
+    def played(variant: Problem) -> dict[str, PointSeries]:
+        # a few rollouts: starting more than one process would take longer
         with SimulationPool(variant, min(1, pool.workers)) as elsewhere:
-            for name, other in _predicted(elsewhere, values, names).items():
-                if name in as_it_is:
-                    columns[name] += _columns(problem, name, as_it_is[name], other, size, noise, offsets)
+            return _predicted(elsewhere, values, names)
+
+    with ThreadPoolExecutor(max(1, pool.workers)) as threads:  # that wait for those processes
+        others = list(threads.map(played, [variant for variant, _ in variants]))
+    for (_, size), made in zip(variants, others, strict=True):
+        for name in made.keys() & as_it_is.keys():
+            columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
     return {n: np.stack(c, axis=1) for n, c in columns.items() if c}, len(names) * len(variants)
 
 

@@ -15,6 +15,8 @@ from .work import Work
 FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 10
 #: Points of every candidate in the first screening, beside where a linear model would go.
 FEW_POINTS = 3
+#: A response to the first look so much larger than the misfit is looked at on other scales.
+FAR_OFF = 3.0
 #: How many candidates pass the screening, and the first polish: by what they reach, and as many by what they promise.
 SCREENED, CONTENDERS = 5, 3
 #: The candidates that are polished to the end: this many, and all that explain half of what the best does.
@@ -100,7 +102,10 @@ class _Tournament:
         acting = sorted((n for n, look in self.looks.items() if look.responds), key=lambda n: self.looks[n].rss)
         for k, name in enumerate(acting):
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
-            found[name] = self.screened(found[name], FEW_POINTS, self.looks[name])
+            look = self.looks[name]
+            there = self.moved(found[name], look.at[None])
+            off = look.reach >= FAR_OFF  # then points all over the prior are wrong by as much
+            found[name] = self.rescaled(there, look) if off else self.screened(there, FEW_POINTS)
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             self.work.study.progress(f"trying {name}", 0, 0)
@@ -121,16 +126,37 @@ class _Tournament:
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
         return [found[name] for name in self.looks]
 
-    def screened(self, candidate: Candidate, count: int, look: Look | None = None) -> Candidate:
-        """The best of the candidate and of ``count`` points: those that a look tells, others that fill its prior."""
+    def rescaled(self, candidate: Candidate, look: Look) -> Candidate:
+        """The best of the candidate and of points where the effect is about as large as the misfit.
+
+        One with a threshold (a grasp that slips, a yield) does nothing below it and everything above, which no
+        derivative tells.
+        """
+        objective = self.work.objective((*self.effects, candidate.name))
+        size, largest = np.sqrt(FAR_OFF / look.reach) * look.step, look.step
+        smallest = size * size / largest
+        for _ in range(FEW_POINTS):
+            if not self.work.may_go_on():
+                break
+            point = look.along(size)
+            white = objective.many(point[None])[0]
+            if white is not None and float(white @ white) < candidate.rss:
+                candidate = replace(candidate, fit=look.as_fit(self.plain, point, white))
+            moved = np.inf if white is None else float(np.linalg.norm(white - self.plain.white))
+            if moved > np.sqrt(self.plain.rss):
+                largest = size
+            else:
+                smallest = size
+            size = float(np.sqrt(smallest * largest))
+        return candidate
+
+    def screened(self, candidate: Candidate, count: int) -> Candidate:
+        """The best of the candidate and of ``count`` points that fill its prior."""
         base = len(self.plain.unit)
         starts = self.plain.unit[None]
         if not self.effects:
             starts = np.vstack([starts, self.work.starts])
-        points = screening_points(candidate.space, base, starts, count, self.rng[candidate.name])
-        if look is not None:
-            points = np.vstack([look.at, look.scale, points])[: count + 1]
-        return self.moved(candidate, points)
+        return self.moved(candidate, screening_points(candidate.space, base, starts, count, self.rng[candidate.name]))
 
     def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
         if not self.work.may_go_on():

@@ -30,6 +30,8 @@ class Takes:
 
     def __init__(self, observer: Observer, scenarios: Mapping[str, Scenario]) -> None:
         self._observer = observer
+        # coordinates that no recording has, as those of a video of heights: the same nothing in every draw
+        self._unmeasured = np.all([~np.isfinite(p).any(axis=(0, 1)) for p in observer.measured()], axis=0)
         self._groups: list[list[int]] = []
         recordings = observer.recordings
         for i, recording in enumerate(recordings):
@@ -87,7 +89,7 @@ class Takes:
                 seen = np.isfinite(takes)
                 total, count = np.where(seen, takes, 0.0).sum(axis=0), seen.sum(axis=0)
                 out.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-        return out
+        return [np.where(self._unmeasured, 0.0, a) for a in out]
 
 
 def _same(a: Scenario, b: Scenario) -> bool:

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from muslin.inference.criticism.linear import least_square
+from muslin.core.arrays import FloatArray
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.criticism.linear import STEP, least_square, look_at
 from muslin.inference.criticism.where import _shortest
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, Polished
+from muslin.inference.residuals import Offsets
 
 
 def test_a_solution_inside_the_cube_is_found_and_its_square_told() -> None:
@@ -39,3 +44,41 @@ def test_a_start_on_a_face_is_no_error() -> None:
 )
 def test_the_shortest_span_holds_most(weights: list[float], span: tuple[int, int]) -> None:
     assert _shortest(np.array(weights, float)) == span
+
+
+class Slip(Objective):
+    """A stiffness, and a slip that does nothing up to ``threshold`` and moves by ``size`` noises beyond it."""
+
+    def __init__(self, threshold: float, size: float) -> None:
+        space = ParameterSpace((Parameter("stiffness", "N", 0, 1), Parameter("slip.rate", "1", 0, 1)))
+        super().__init__(None, space, [], Noise(1.0, 0.0, "test", "m", 0.01), Offsets())  # type: ignore[arg-type]
+        self.threshold, self.size = threshold, size
+        rng = np.random.default_rng(0)
+        self.stiff, self.moved, self.noise = rng.normal(size=50) * 10, rng.normal(size=50), rng.normal(size=50)
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return [
+            self.noise + self.stiff * (u[0] - 0.5) + self.size * self.moved * max(0.0, u[1] - self.threshold)
+            for u in units
+        ]
+
+    def plain(self) -> Polished:
+        white = self.many(np.array([[0.5, 0.0]]))[0]
+        assert white is not None
+        return Polished(np.array([0.5]), np.eye(1), self.stiff[:, None], white, 50.0)
+
+
+def test_a_look_tells_how_large_the_response_is() -> None:
+    objective = Slip(0.0, 10.0)
+    look = look_at("slip", objective, objective.plain())
+    assert look.step == STEP and look.reach == pytest.approx(1.0, rel=0.3)
+    np.testing.assert_allclose(look.along(0.05), [0.5, 0.05])
+    assert (look.along(2.0) <= 1.0).all()
+
+
+def test_what_does_nothing_at_first_is_moved_further() -> None:
+    objective = Slip(0.3, 10.0)
+    look = look_at("slip", objective, objective.plain())
+    assert look.responds and look.step > 0.3
+    nothing = Slip(2.0, 10.0)
+    assert not look_at("slip", nothing, nothing.plain()).responds

@@ -66,9 +66,11 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
     """
     shift = held.recording.series.points - held.residual.difference - _matched(held)  # offsets, and clock
     measured = held.recording.series.points - np.nan_to_num(shift)
+    unmeasured = ~np.isfinite(measured).any(axis=(0, 1))  # a coordinate that nobody measured agrees with any
+    measured[..., unmeasured] = _matched(held)[..., unmeasured]
     columns = _spread(measured.shape[1], _MOST_POINTS)
     measured, origin = measured[:, columns], held.origin[:, columns]
-    seen = held.recording.series.valid[:, columns]
+    seen = np.asarray(np.isfinite(measured).all(axis=2))
     model = held.best.series.points[:, _spread(held.best.series.points.shape[1], _MOST_POINTS)]
     if held.paired:  # of points that correspond, those not seen say nothing about the others
         model = np.where(seen[..., None], model, np.nan)
@@ -78,6 +80,7 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
     mmd = np.linalg.norm(embed(measured[None])[0] - predicted, axis=1)
     draws = NoiseDraws(noise, _REPLICATES, rng)
     made = origin + draws.of(measured.shape, rng) * noise.sd
+    made[..., unmeasured] = origin[..., unmeasured]
     made[:, ~seen] = np.nan
     step = max(1, _CHUNK // (seen.size * _FEATURES))
     null = np.concatenate(

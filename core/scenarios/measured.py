@@ -1,0 +1,92 @@
+"""A rope that starts as it was measured: through the markers of the first frame, at rest."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..body import Body, rope_line
+from ..errors import InputError
+from ..measurement import Recording
+from ..motion import inverse, rotate
+from ..obstacles import Obstacle
+from ..scenario import Scenario
+
+#: Points between two markers at which the curve through them is measured.
+_FINE = 200
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredShape:
+    """A curve carried by the first gripper, cut into segments of equal length: as many as the rope has.
+
+    Args:
+        curve: ``(K, 3)`` [m] in the frame of the first gripper at its first pose, finely sampled.
+        along: length of the curve up to each of its points ``(K,)`` [m].
+    """
+
+    curve: FloatArray
+    along: FloatArray
+
+    def __call__(
+        self,
+        body: Body,
+        poses: FloatArray,
+        grasps: tuple[IntArray, ...],
+        obstacles: tuple[Obstacle, ...],
+        clearance: float,
+    ) -> FloatArray:
+        where = np.linspace(0.0, self.along[-1], len(body.vertices))
+        local = np.stack([np.interp(where, self.along, self.curve[:, k]) for k in range(3)], axis=1)
+        return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
+
+
+def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
+    """The scenario of a rope whose markers, in their order along it, reach from its first vertex to its last.
+
+    At rest it is straight and as long as the curve through the markers of the first frame (a natural cubic spline over
+    the chords), along which every marker keeps its place.
+
+    Raises:
+        InputError: not a rope, or a marker is not seen in the first frame.
+    """
+    if scenario.body.kind != "rope" or not recording.series.correspondence:
+        raise InputError(f"recording {recording.name!r}: only a rope with markers in order starts as measured")
+    points = recording.series.points[0]
+    if len(points) < 3 or not np.isfinite(points).all():
+        raise InputError(
+            f"recording {recording.name!r}: every marker must be seen in the first frame, at least 3; start it later"
+        )
+    curve, along, places = _curve(points)
+    count = len(scenario.body.vertices)
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [along[-1], 0.0, 0.0]]), count)
+    pose = scenario.motion.at(scenario.times[:1])[0, 0]
+    local = rotate(inverse(pose[3:]), curve - pose[:3])
+    share = places / along[-1] * (count - 1)
+    left = np.minimum(share.astype(np.int64), count - 2)
+    markers = np.zeros((len(points), count))
+    markers[np.arange(len(points)), left] = 1.0 - (share - left)
+    markers[np.arange(len(points)), left + 1] = share - left
+    return replace(scenario, body=body, start=MeasuredShape(local, along), markers=markers)
+
+
+def _curve(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The natural cubic spline through ``points (M, 3)``: finely sampled, its length so far, that at the points."""
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if not (chords > 0).all():
+        raise InputError(f"markers {int(np.argmin(chords))} and the next are at one place in the first frame")
+    count = len(points)
+    matrix, right = np.eye(count), np.zeros((count, 3))
+    for k in range(1, count - 1):  # second derivatives: the slopes on both sides of every inner point agree
+        a, b = chords[k - 1], chords[k]
+        matrix[k, k - 1 : k + 2] = a, 2 * (a + b), b
+        right[k] = 6 * ((points[k + 1] - points[k]) / b - (points[k] - points[k - 1]) / a)
+    bends = np.linalg.solve(matrix, right)
+    u = np.linspace(0.0, 1.0, _FINE, endpoint=False)[:, None]
+    parts = []
+    for k, h in enumerate(chords):
+        straight = (1 - u) * points[k] + u * points[k + 1]
+        parts.append(straight + h**2 / 6 * (((1 - u) ** 3 - (1 - u)) * bends[k] + (u**3 - u) * bends[k + 1]))
+    curve = np.concatenate([*parts, points[-1:]])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    return curve, along, along[::_FINE]

@@ -1,0 +1,1 @@
+"""Recordings that others published, read by name: see :class:`muslin.core.dataset.Dataset`."""

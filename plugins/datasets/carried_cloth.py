@@ -1,0 +1,101 @@
+"""A square cloth whose top edge a robot carries through the air, tracked as a grid."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.dataset import archives, arrays, chosen, note, shaped
+from ...core.errors import InputError
+from ...core.interpolation import interpolate
+from ...core.measurement import Recording
+from ...core.motion import Motion, inverse, multiply, rotate
+from ...core.series import PointSeries
+from .carried_turns import carried_turns
+
+#: Orientation of the hand, w x y z, in which the cloth hangs in the x-z plane, its columns from low to high x.
+HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
+#: Lags of the camera behind the gripper that are tried [s]: beyond what was found, both ways.
+LAGS = np.arange(-0.6, 0.6001, 0.01)
+
+
+def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
+    """Takes from a folder of NPZ files, or one: ``mesh (T, n, n, 3)`` [m], ``t (T,)`` [s], and ``tcp``, ``tcp_t``.
+
+    Points are in the order of the vertices of a hanging cloth: row by row from the held top edge, which is the last
+    index of axis 2 in the file, along x. The gripper is the middle of the top edge and turns with the hand: where it is
+    in the hand is the median over the recording, in which a constant offset between camera and robot goes too. The
+    camera's clock lags the robot's; the lag is the one at which the top edge moves most like the hand, and points are
+    given on the robot's clock. Without ``tcp`` the tracked top edge itself is the gripper.
+
+    Takes with names alike are no repeats: they start at other moments, and the paths of the hand differ by centimetres.
+
+    References:
+        Luque, Parent, Colomé, Ocampo-Martinez and Torras, *Model predictive control for dynamic cloth manipulation:
+        parameter learning and experimental validation* (2022); github.com/Alados5/tfm_matlab.
+    """
+    files = archives(path, ("mesh", "t"))
+    return [_recording(files[name], name) for name in chosen(takes, list(files), path)]
+
+
+def _recording(path: Path, name: str) -> Recording:
+    data = arrays(path, ("mesh", "t"))
+    mesh, time = shaped(data["mesh"], (None, None, None, 3), "mesh", path), data["t"]
+    if mesh.shape[1] != mesh.shape[2] or len(time) != len(mesh):
+        raise InputError(f"{path}: mesh must be (T, n, n, 3) with T times t, but is {mesh.shape} with {time.shape}")
+    points = mesh[:, :, ::-1].transpose(0, 2, 1, 3).reshape(len(mesh), -1, 3)
+    top = points[:, : mesh.shape[1]]
+    whole = np.isfinite(top).all(axis=(1, 2))
+    if whole.sum() < 10:
+        raise InputError(f"{path}: the whole top edge is seen in {int(whole.sum())} frames; at least 10 are needed")
+    middle = top[whole].mean(axis=1)
+    if "tcp" not in data:
+        note(f"{name}: no poses of the robot; the tracked top edge is taken for the gripper")
+        turns = carried_turns(_along(top[whole]), np.array([1.0, 0.0, 0.0]))
+        motion = Motion(time[whole], np.concatenate([middle, turns], axis=1)[:, None])
+        return Recording(name, PointSeries(time, points), motion)
+    hand = shaped(data["tcp"], (None, 7), "tcp", path)
+    clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand)
+    lag = camera_lag(time[whole], middle, clock, hand[:, :3])
+    note(f"{name}: the camera lags the robot by {lag:.2f} s; points are on the robot's clock")
+    turns = multiply(hand[:, [6, 3, 4, 5]], inverse(HOME))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    then = Motion(clock, np.concatenate([hand[:, :3], turns], axis=1)[:, None]).at(time[whole] - lag)[:, 0]
+    held = np.median(rotate(inverse(then[:, 3:]), middle - then[:, :3]), axis=0)
+    poses = np.concatenate([hand[:, :3] + rotate(turns, held), turns], axis=1)
+    return Recording(name, PointSeries(time - lag, points), Motion(clock, poses[:, None]))
+
+
+def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> float:
+    """How much later the camera stamps what the hand does [s]: where their displacements correlate most.
+
+    Args:
+        seen: ``(T,)`` [s], of the camera.
+        edge: ``(T, 3)`` [m], what the hand carries.
+        clock: ``(K,)`` [s], of the robot.
+        hand: ``(K, 3)`` [m].
+    """
+    moved = edge - edge.mean(axis=0)
+    score = np.empty(len(LAGS))
+    for k, lag in enumerate(LAGS):
+        then = interpolate(seen - lag, clock, hand)
+        then = then - then.mean(axis=0)
+        score[k] = np.sum(moved * then) / max(float(np.sqrt(np.sum(moved**2) * np.sum(then**2))), 1e-12)
+    best = int(np.argmax(score))
+    if not 0 < best < len(LAGS) - 1:
+        return float(LAGS[best])
+    below, at, above = score[best - 1 : best + 2]
+    return float(LAGS[best] + (LAGS[1] - LAGS[0]) * 0.5 * (below - above) / min(below - 2 * at + above, -1e-12))
+
+
+def _along(top: FloatArray) -> FloatArray:
+    """Direction of the top edge ``(T, 3)``: the slope of its nodes over their number."""
+    share = np.arange(top.shape[1]) - (top.shape[1] - 1) / 2
+    return np.asarray(np.einsum("p,tpx->tx", share, top))
+
+
+def _rising(clock: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Without messages that came twice or late."""
+    keep = np.concatenate([[True], clock[1:] > np.maximum.accumulate(clock)[:-1]])
+    return clock[keep], poses[keep]

@@ -1,0 +1,134 @@
+"""Real recordings: how far the model is off on takes that it was not fitted to, and which effect is named.
+
+Balls and beam are in the repository; the others are read from the folder in the environment variable MUSLIN_DATA, and
+skipped where it has none::
+
+    make bench-real        or        python tests/benchmarks/real.py --only 'cable 2'
+"""
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from real_cases import CASES, Case
+from table import RESULTS, machine, versions
+
+from muslin.core.registry import REGISTRY
+from muslin.core.study import Study
+
+COLUMNS = ("baseline", "unfitted", "fitted", "after", "noise")
+TITLES = ("set", "fitted on", "held out", *COLUMNS, "verdict", "rollouts", "seconds")
+
+
+def absolute(study: Study, values: Mapping[str, float], effects: list[str]) -> dict[str, float]:
+    """Errors [m] on held-out takes: of a point, the median; of a coordinate, the mean absolute one."""
+    problem = replace(study.problem, effects={n: REGISTRY.get("effect", n) for n in effects})
+    off = []
+    for name in problem.hold_out:
+        difference = problem.simulate(values, name).series.points - problem.recordings[name].series.points
+        off.append(difference[np.isfinite(difference).all(axis=2)])
+    every = np.concatenate(off)
+    return {
+        "median_point": float(np.median(np.linalg.norm(every, axis=1))),
+        "mean_coordinate": float(np.mean(np.abs(every))),
+    }
+
+
+def row_of(case: Case, study: Study) -> dict[str, Any]:
+    """One line of the table, lengths in metres: fit, compare, diagnose."""
+    began = time.monotonic()
+    fit = study.fit()
+    held = [r for r in study.compare().rows if r.role == "held-out"]
+    found = study.diagnose().result
+    seconds = time.monotonic() - began
+    row: dict[str, Any] = {
+        "set": case.name,
+        "fitted on": list(study.problem.fit_on),
+        "held out": list(study.problem.hold_out),
+        "baseline": rms([r.baseline for r in held]),
+        "unfitted": rms([r.default for r in held]),
+        "fitted": rms([r.rmse for r in held]),
+        "after": found["error"]["after"] if found["effects"] else None,
+        "noise": fit.noise.sd,
+        "noise from": fit.noise.source,
+        "verdict": f"{found['verdict']}: {', '.join(found['effects']) or '-'}",
+        "rollouts": int(fit.simulations) + int(found["simulations"]),
+        "seconds": round(seconds, 1),
+        "estimate": fit.values(),
+        "told": found["told"] if isinstance(found.get("told"), str) else None,
+        "candidates": [
+            {k: c[k] for k in ("name", "coefficients", "explained", "z", "objection", "held_out_after")}
+            for c in found["candidates"][:5]
+        ],
+    }
+    if case.open_loop:
+        space = study.problem.space
+        row["unfitted open loop"] = absolute(study, space.as_dict(space.from_unit(np.full(len(space), 0.5))), [])
+        row["fitted open loop"] = absolute(study, fit.values(), [])
+        models = study.results()["diagnose"].attrs["models"]
+        named = [m for m in models if found["effects"] and m["effects"] in (found["effects"], found["effects"][:1])]
+        if named:
+            row["after open loop"] = absolute(study, named[0]["values"], named[0]["effects"])
+    return row
+
+
+def rms(errors: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def markdown(rows: list[dict[str, Any]], skipped: list[str]) -> str:
+    lines = ["| " + " | ".join(TITLES) + " |", "|" + "---|" * len(TITLES)]
+    for r in rows:
+        lengths = ["–" if r[c] is None else f"{1e3 * r[c]:.4g}" for c in COLUMNS]
+        cells = [r["set"], ", ".join(r["fitted on"]), ", ".join(r["held out"]), *lengths, r["verdict"]]
+        lines.append("| " + " | ".join([*cells, str(r["rollouts"]), f"{r['seconds']:.0f}"]) + " |")
+    lines += ["", "Errors on held-out takes in mm, root mean square a coordinate.", ""]
+    for r in rows:
+        for state in ("unfitted", "fitted", "after"):
+            if (e := r.get(f"{state} open loop")) is not None:
+                lines.append(
+                    f"- {r['set']}, {state}, open loop: median point error {1e3 * e['median_point']:.1f} mm, mean "
+                    f"absolute coordinate error {1e3 * e['mean_coordinate']:.1f} mm"
+                )
+    lines += [f"- skipped: {s}" for s in skipped]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--workers", type=int, default=None)
+    parser.add_argument("--only", nargs="*", help=f"of {', '.join(c.name for c in CASES)}; the others keep their rows")
+    told = parser.parse_args()
+    rows, skipped = [], []
+    for case in CASES:
+        if told.only is not None and case.name not in told.only:
+            continue
+        if not case.needs.exists():
+            skipped.append(f"{case.name}: there is no {case.needs.name} where MUSLIN_DATA points")
+            print(f"skipped {skipped[-1]}", flush=True)
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            row = row_of(case, case.make(Path(folder), told.workers))
+        rows.append(row)
+        print(f"{case.name}: {row['verdict']}, {row['seconds']:.0f} s", flush=True)
+    path = RESULTS / "real.json"
+    if told.only is not None and path.exists():
+        rows += [r for r in json.loads(path.read_text())["rows"] if r["set"] not in [n["set"] for n in rows]]
+    order = [c.name for c in CASES]
+    rows.sort(key=lambda r: order.index(r["set"]))
+    text = markdown(rows, skipped)
+    print("\n" + text)
+    content = {"machine": machine(), "versions": versions(), "rows": rows, "skipped": skipped}
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    path.with_suffix(".md").write_text(text, encoding="utf-8")
+    print(f"wrote {path} and real.md")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""The real recordings of the benchmark: how each set becomes a study."""
+
+import importlib.util
+import os
+import shutil
+import warnings
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from muslin.core.dataset import DatasetNote, cropped
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.measurement_store import save_measurement
+from muslin.core.registry import REGISTRY
+from muslin.core.study import Study, read_config, write_config
+
+ROOT = Path(__file__).resolve().parents[2]
+EXAMPLES = ROOT / "examples"
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+
+#: Takes of a cable, fitted on and held out: those that start slowest, alternately, all of their 5 s.
+CABLE_TAKES = (3, 2)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One set.
+
+    Args:
+        name: in the table.
+        needs: a file or folder that must be there.
+        make: makes the study in an empty folder.
+        open_loop: nothing of the measurement is taken out, so absolute errors can be compared with those of others.
+    """
+
+    name: str
+    needs: Path
+    make: Callable[[Path, int | None], Study]
+    open_loop: bool = False
+
+
+def module(path: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    return made
+
+
+def takes_of(dataset: str, path: Path, takes: Sequence[str] = ()) -> list[Recording]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DatasetNote)
+        return list(REGISTRY.get("dataset", dataset)(path, list(takes)))
+
+
+def ball(name: str) -> Case:
+    def make(folder: Path, workers: int | None) -> Study:
+        for file in (f"{name}.toml", f"{name}.vtk"):
+            shutil.copy(EXAMPLES / "balls" / file, folder)
+        drops = takes_of("balls", EXAMPLES / "balls/drops.csv")
+        save_measurement(Measurement(tuple(drops)), folder / "balls.zarr")
+        return Study.load(folder / f"{name}.toml", workers=workers)
+
+    return Case(f"ball: {name}", EXAMPLES / "balls/drops.csv", make)
+
+
+def beam(folder: Path, workers: int | None) -> Study:
+    shutil.copy(EXAMPLES / "beam/study.toml", folder)
+    module(EXAMPLES / "demo.py").import_beam(folder)
+    return Study.load(folder / "study.toml", workers=workers)
+
+
+def start_speed(recording: Recording) -> float:
+    """How fast the fastest marker is at the start [m/s], infinite where one is not seen: a rollout starts at rest."""
+    steps = np.diff(recording.series.points[:6], axis=0)
+    speed = np.linalg.norm(steps, axis=2).max(axis=1) / np.diff(recording.series.time[:6])
+    return float(np.median(speed)) if np.isfinite(speed).all() else float("inf")
+
+
+def cable(number: int) -> Case:
+    path = DATA / f"cable/cable{number}.npz"
+
+    def make(folder: Path, workers: int | None) -> Study:
+        used = sorted(takes_of("deform-cable", path), key=start_speed)[: sum(CABLE_TAKES)]
+        config = read_config(EXAMPLES / "cable/study.toml")
+        config.study.hold_out = [r.name for r in used[1::2]]
+        config.study.fit_on = [r.name for r in used[0::2]]
+        write_config(config, folder / "study.toml")
+        save_measurement(Measurement(tuple(used)), folder / config.study.measurement)
+        return Study.load(folder / "study.toml", workers=workers)
+
+    return Case(f"cable {number}", path, make, open_loop=True)
+
+
+def carried_cloth(folder: Path, workers: int | None) -> Study:
+    """The first 4 s of every take, as the command in examples/carried_cloth/README.md imports them."""
+    config = read_config(EXAMPLES / "carried_cloth/study.toml")
+    used = [*(config.study.fit_on or []), *config.study.hold_out]
+    takes = [cropped(r, None, 4.0) for r in takes_of("carried-cloth", DATA / "cloth_carried", used)]
+    shutil.copy(EXAMPLES / "carried_cloth/study.toml", folder)
+    save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
+    return Study.load(folder / "study.toml", workers=workers)
+
+
+CASES = [
+    *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
+    Case("beam", EXAMPLES / "beam/data", beam),
+    *(cable(number) for number in (1, 2, 3)),
+    Case("carried cloth", DATA / "cloth_carried", carried_cloth, open_loop=True),
+]

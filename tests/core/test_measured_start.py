@@ -1,0 +1,62 @@
+"""Ropes that start as they were measured."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+from muslin.core.errors import InputError
+from muslin.core.measurement import Recording
+from muslin.core.motion import Motion
+from muslin.core.refinement import refined
+from muslin.core.scenario import Scenario
+from muslin.core.scenarios import preset
+from muslin.core.scenarios.measured import measured_start
+from muslin.core.series import PointSeries
+
+TURN = np.array([np.cos(0.3), 0.0, np.sin(0.3), 0.0])
+
+
+def recorded(points: np.ndarray) -> tuple[Scenario, Recording]:
+    time = np.array([0.0, 1.0])
+    poses = np.stack([np.concatenate([points[k], TURN]) for k in (0, -1)])
+    motion = Motion(time, np.stack([poses, poses + 0.0]))
+    recording = Recording("take", PointSeries(time, np.stack([points, points])), motion)
+    return preset("cable").scenario((1.2,), (31,)).for_recording(recording), recording
+
+
+def arc(places: np.ndarray) -> np.ndarray:
+    """On a circle of radius 0.4 m."""
+    return np.asarray(np.stack([0.4 * np.sin(places), 0.1 + 0.0 * places, 1.0 - 0.4 * np.cos(places)], axis=1))
+
+
+def test_it_goes_through_the_markers_and_is_as_long_as_the_curve() -> None:
+    angles = np.array([-1.2, -1.1, -0.8, -0.4, -0.1, 0.25, 0.6, 0.9, 1.1, 1.2])
+    made = measured_start(*recorded(arc(angles)))
+    start = made.start_vertices()
+    np.testing.assert_allclose(made.markers @ start, arc(angles), atol=6e-4)  # between vertices it is straight
+    np.testing.assert_allclose(np.linalg.norm(start - [0.0, 0.1, 1.0], axis=1), 0.4, atol=5e-4)
+    links = np.linalg.norm(np.diff(start, axis=0), axis=1)
+    np.testing.assert_allclose(links, made.body.measures, rtol=1e-3)  # neither stretched nor slack
+    assert made.body.measures.sum() == pytest.approx(0.4 * 2.4, rel=2e-3)
+    np.testing.assert_allclose(made.markers.sum(axis=1), 1.0)
+
+
+def test_it_survives_refinement_and_pickling() -> None:
+    made = measured_start(*recorded(arc(np.linspace(-1.0, 1.0, 9))))
+    fine = refined(made)
+    assert fine is not None
+    start = pickle.loads(pickle.dumps(fine)).start_vertices()
+    assert len(start) == 61
+    np.testing.assert_allclose(start[::2], made.start_vertices(), atol=1e-9)
+
+
+def test_what_cannot_be_is_said() -> None:
+    points = arc(np.linspace(-1.0, 1.0, 9))
+    hidden = points.copy()
+    hidden[4, 1] = np.nan
+    with pytest.raises(InputError, match=r"'take': every marker must be seen"):
+        measured_start(*recorded(hidden))
+    points[3] = points[4]
+    with pytest.raises(InputError, match="markers 3 and the next are at one place"):
+        measured_start(*recorded(points))

@@ -1,0 +1,268 @@
+"""Readers of published sets: what they promise, on small files made here, and on the real ones where there are any."""
+
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from muslin.core.dataset import DatasetNote, cropped
+from muslin.core.errors import InputError, MissingFileError
+from muslin.core.measurement import Recording
+from muslin.core.motion import rotate
+from muslin.core.registry import REGISTRY
+
+ROOT = Path(__file__).resolve().parents[2]
+DROPS = ROOT / "examples/balls/drops.csv"
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+FOLDERS = {"deform-cable": "cable", "carried-cloth": "cloth_carried", "cloth-cloud": "cloth_cloud"}
+
+
+def read(name: str, path: Path, *takes: str) -> tuple[list[Recording], list[str]]:
+    """Recordings, and what the reader said about them."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", DatasetNote)
+        recordings = REGISTRY.get("dataset", name)(path, list(takes))
+    return recordings, [str(w.message) for w in caught]
+
+
+def real(name: str) -> Path:
+    path = DATA / FOLDERS[name]
+    if not path.exists():
+        pytest.skip(f"the recordings of {name} are not here; set MUSLIN_DATA to their folder")
+    return path
+
+
+def swinging_cable(frames: int = 60, markers: int = 8) -> np.ndarray[Any, Any]:
+    """A cable hanging between two ends, 0.1 m from marker to marker, both ends moving along y."""
+    along = np.linspace(-0.35, 0.35, markers)
+    rest = np.stack([along, 0.0 * along, 0.5 * along**2], axis=1)
+    t = 0.01 * np.arange(frames)
+    sway = np.stack([0.0 * t, 0.1 * np.sin(6.0 * t), 0.0 * t], axis=1)
+    return np.asarray(rest + sway[:, None])
+
+
+def save_cable(path: Path, markers: np.ndarray[Any, Any], names: Sequence[str] = ("7.pkl",), **other: Any) -> Path:
+    markers = markers if markers.ndim == 4 else markers[None]
+    arrays = {"markers": markers, "clamped": np.array([0, 1, -2, -1]), "fps": 100.0, "names": np.array(names)}
+    np.savez(path, **{**arrays, **other})
+    return path
+
+
+def test_heights_alone_are_heights_and_fall() -> None:
+    (drop, again), notes = read("balls", DROPS, "golf-ball-1", "golf-ball-2")
+    assert drop.series.points.shape[1:] == (1, 3) and drop.series.unit == "m" and drop.gripper is None
+    assert np.isnan(drop.series.points[..., :2]).all() and np.isfinite(drop.series.points[..., 2]).all()
+    assert drop.motion == again.motion == "golf-ball"  # repeats
+    late = drop.series.time > drop.series.time[0] + 1.0
+    g = -2 * np.polyfit(drop.series.time[late], drop.series.points[late, 0, 2], 2)[0]
+    assert 8.5 < g < 10.5  # metres, seconds, z up; a golf ball hardly feels the air
+    assert notes == ["golf-ball-2: left out 1 of 44 frames, in which the ball is still held"]
+
+
+def test_a_drop_starts_less_than_a_frame_before_the_release(tmp_path: Path) -> None:
+    time = np.arange(60) / 15
+    for released in (0.0, 0.43, 0.97):
+        height = 40.0 - 0.5 * 9.80665 * np.maximum(time - released, 0.0) ** 2
+        rows = [f"Lead Ball,1,{t:.6f},{h:.6f}" for t, h in zip(time, height, strict=True)]
+        path = tmp_path / "drops.csv"
+        path.write_text("ball,drop,time_s,height_m\n" + "\n".join(rows))
+        (drop,), _ = read("balls", path)
+        assert drop.name == "lead-ball-1"
+        assert -0.02 <= released - drop.series.time[0] < 1 / 15 + 0.02
+
+
+def test_grippers_carry_the_clamped_markers(tmp_path: Path) -> None:
+    markers = swinging_cable()
+    (take,), notes = read("deform-cable", save_cable(tmp_path / "cable.npz", markers))
+    assert not notes and take.name == "7" and take.gripper is not None
+    np.testing.assert_allclose(take.series.points, markers)
+    np.testing.assert_allclose(take.series.time, 0.01 * np.arange(len(markers)))
+    poses = take.gripper.poses
+    for g, (outer, inner) in enumerate(((0, 1), (7, 6))):
+        pair = markers[:, inner] - markers[:, outer]
+        length = np.linalg.norm(pair, axis=1)
+        np.testing.assert_allclose(poses[:, g, :3], markers[:, outer], atol=1e-12)
+        x = np.stack([length, 0 * length, 0 * length], axis=1)
+        np.testing.assert_allclose(rotate(poses[:, g, 3:], x), pair, atol=1e-12)
+
+
+def test_a_gripper_does_not_turn_about_the_cable(tmp_path: Path) -> None:
+    """A pair of markers tilted to and fro comes back to the orientation that it had."""
+    markers = swinging_cable()
+    tilt = 0.4 * np.sin(np.linspace(0, 2 * np.pi, len(markers)))
+    markers[:, 1] = markers[:, 0] + 0.1 * np.stack([np.cos(tilt), 0 * tilt, np.sin(tilt)], axis=1)
+    (take,), _ = read("deform-cable", save_cable(tmp_path / "cable.npz", markers))
+    assert take.gripper is not None
+    q = take.gripper.poses[:, 0, 3:]
+    assert abs(np.sum(q[0] * q[-1])) > 1 - 1e-9
+    across = rotate(q, np.broadcast_to([0.0, 1.0, 0.0], (len(q), 3)))
+    np.testing.assert_allclose(across, np.broadcast_to(across[0], across.shape), atol=1e-9)  # the axis of the tilt
+
+
+@pytest.mark.parametrize("a, b", [(3, 4), (2, 5), (0, 1), (6, 7)])
+def test_swapped_markers_are_masked_where_they_are_swapped(tmp_path: Path, a: int, b: int) -> None:
+    markers = swinging_cable()
+    swapped = slice(20, 26)
+    markers[swapped, [[a], [b]]] = markers[swapped, [[b], [a]]]
+    (take,), notes = read("deform-cable", save_cable(tmp_path / "cable.npz", markers))
+    wrong = ~take.series.valid
+    assert wrong[swapped][:, [a, b]].all() and wrong.sum() == 12
+    assert any("left out in 6 frames" in n for n in notes)
+    assert not any("lost frames" in n for n in notes)
+    assert take.gripper is not None and np.isfinite(take.gripper.poses).all()
+    if a == 0 or b == 7:  # poses of a gripper come from right frames only
+        assert len(take.gripper.times) == len(markers) - 6
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_lost_frames_go_back_on_the_clock(tmp_path: Path, count: int) -> None:
+    whole = swinging_cable(60 + count)
+    # lost in motion, not at a turning point, where nothing moves and nothing is lost either
+    markers = np.concatenate([whole[:48], whole[48 + count :]])
+    (take,), notes = read("deform-cable", save_cable(tmp_path / "cable.npz", markers))
+    assert f"{count} lost frames" in notes[0]
+    there = np.concatenate([np.arange(48), np.arange(48 + count, 60 + count)])
+    np.testing.assert_allclose(take.series.time, 0.01 * there)
+
+
+def test_takes_are_read_in_the_order_asked_for(tmp_path: Path) -> None:
+    cable = swinging_cable()
+    path = save_cable(tmp_path / "cable.npz", np.stack([cable, cable + 1.0, cable + 2.0]), ("a.pkl", "b.pkl", "c.pkl"))
+    takes, _ = read("deform-cable", path, "c", "a")
+    assert [t.name for t in takes] == ["c", "a"]
+    assert takes[0].series.points[0, 0, 0] > takes[1].series.points[0, 0, 0] + 1.5
+    assert len(read("deform-cable", path)[0]) == 3
+
+
+def carried(lag: float, offset: Sequence[float], n: int = 5) -> dict[str, Any]:
+    """A rigid sheet under a hand that moves and tilts, seen late and aside by a camera."""
+    clock, seen = np.arange(0, 6, 0.05), np.arange(0.5, 5.5, 0.1)
+
+    def hand(t: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+        at = np.stack([0.1 * np.sin(1.3 * t), -0.4 + 0.08 * np.sin(2.1 * t), 0.35 + 0.05 * np.cos(1.7 * t)], axis=1)
+        a = 0.15 * np.sin(1.1 * t)  # about x, before the home orientation
+        return at, np.stack([np.cos(a), np.sin(a), 0 * a, 0 * a], axis=1)
+
+    def times_home(q: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        w, x = q[:, 0], q[:, 1]
+        s = 0.5**0.5  # (w, x, 0, 0) * (0, s, s, 0)
+        return np.stack([-x * s, w * s, w * s, x * s], axis=1)
+
+    at, turn = hand(clock)
+    home = times_home(turn)
+    then, its_turn = hand(seen - lag)
+    grid = np.stack(np.meshgrid(np.linspace(-0.15, 0.15, n), np.linspace(-0.3, 0.0, n), indexing="ij"), axis=-1)
+    local = np.stack([grid[..., 0], 0 * grid[..., 0], grid[..., 1] - 0.1], axis=-1).reshape(-1, 3)
+    mesh = rotate(its_turn[:, None], np.broadcast_to(local, (len(seen), *local.shape))) + then[:, None]
+    mesh = (mesh + np.array(offset)).reshape(len(seen), n, n, 3)
+    return {"mesh": mesh, "t": seen, "tcp_t": clock, "tcp": np.concatenate([at, home[:, [1, 2, 3, 0]]], axis=1)}
+
+
+def test_the_gripper_of_a_carried_cloth_is_its_top_edge(tmp_path: Path) -> None:
+    lag = 0.31
+    made = carried(lag, (-0.029, -0.005, 0.0))
+    np.savez(tmp_path / "s_rep1.npz", **made)
+    (take,), notes = read("carried-cloth", tmp_path)
+    assert take.name == take.motion == "s_rep1" and "lags the robot by 0.31 s" in notes[0]
+    assert take.gripper is not None
+    np.testing.assert_allclose(take.series.time, made["t"] - lag, atol=0.01)
+    top = take.series.points[:, :5]
+    assert (top[..., 2].mean(axis=1) > take.series.points[:, -5:, 2].mean(axis=1) + 0.2).all()  # row 0 is held
+    assert (np.diff(top[..., 0], axis=1) > 0).all()
+    pose = take.gripper.at(take.series.time)[:, 0]
+    np.testing.assert_allclose(pose[:, :3], top.mean(axis=1), atol=0.004)
+    down = rotate(pose[:, 3:], np.broadcast_to([0.0, 0.0, -0.3], (len(pose), 3)))
+    sheet = take.series.points[:, -5:].mean(axis=1) - top.mean(axis=1)
+    np.testing.assert_allclose(down, sheet, atol=0.005)  # it hangs where the hand points
+
+
+def test_without_a_hand_the_tracked_edge_carries(tmp_path: Path) -> None:
+    made = carried(0.0, (0.0, 0.0, 0.0))
+    made["mesh"][7, 0, -1] = np.nan
+    np.savez(tmp_path / "a.npz", mesh=made["mesh"], t=made["t"])
+    (take,), notes = read("carried-cloth", tmp_path / "a.npz", "a")
+    assert "top edge is taken for the gripper" in notes[0] and take.gripper is not None
+    assert len(take.gripper.times) == len(take.series.time) - 1
+    np.testing.assert_allclose(take.gripper.poses[0, 0, :3], take.series.points[0, :5].mean(axis=0), atol=1e-9)
+
+
+def test_clouds_have_no_correspondence_and_skip_the_arm(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    time = 0.1 * np.arange(12)
+    np.savez(tmp_path / "fold_x2.npz", points=rng.normal(size=(12, 30, 3)), gripper_cmd=np.ones((12, 3)), t=time)
+    (take,), _ = read("cloth-cloud", tmp_path)
+    assert not take.series.correspondence and take.motion == "fold_x"
+    np.testing.assert_allclose(take.series.time, time[5:])
+    assert take.gripper is not None and take.gripper.times[0] == 0.0
+
+
+def test_what_is_wrong_is_said(tmp_path: Path) -> None:
+    many = save_cable(tmp_path / "many.npz", np.stack([swinging_cable()] * 11), [f"{k}.pkl" for k in range(11)])
+    with pytest.raises(InputError, match=r"no take '99'; it has 0, 1, 2, .*and 3 more"):
+        read("deform-cable", many, "99")
+    with pytest.raises(InputError, match="take 3 is asked for twice"):
+        read("deform-cable", many, "3", "3")
+    with pytest.raises(InputError, match="no take 'cricket-1'"):
+        read("balls", DROPS, "cricket-1")
+    for name in ("balls", "deform-cable", "carried-cloth", "cloth-cloud"):
+        with pytest.raises(MissingFileError, match=r"no file.*nowhere"):
+            read(name, tmp_path / "nowhere.npz")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"holds no \.npz file"):
+        read("cloth-cloud", tmp_path / "empty")
+    with pytest.raises(InputError, match=r"no array 'mesh'; it needs mesh, t, and has markers"):
+        read("carried-cloth", many)
+    (tmp_path / "text.npz").write_text("no archive")
+    with pytest.raises(InputError, match="not an NPZ archive"):
+        read("deform-cable", tmp_path / "text.npz")
+    flat = save_cable(tmp_path / "flat.npz", swinging_cable()[..., :2])
+    with pytest.raises(InputError, match=r"markers must have shape \(any, any, any, 3\)"):
+        read("deform-cable", flat)
+
+
+def test_a_crop_keeps_the_clock() -> None:
+    (drop,), _ = read("balls", DROPS, "bowling-ball-1")
+    part = cropped(drop, 1.0, 2.0)
+    assert part.series.time[0] >= 1.0 and part.series.time[-1] <= 2.0
+    assert cropped(drop, None, None) is drop
+    with pytest.raises(InputError, match="fewer than 2 frames"):
+        cropped(drop, 100.0, None)
+
+
+def test_real_cables_have_a_length_that_hardly_changes() -> None:
+    path = real("deform-cable") / "cable1.npz"
+    takes, notes = read("deform-cable", path)
+    assert len(takes) == 56 and any("lost frames" in n for n in notes)
+    for take in takes:
+        apart = np.linalg.norm(np.diff(take.series.points, axis=1), axis=2)
+        assert np.isfinite(apart).mean() > 0.95
+        assert 0.9 < np.nansum(np.nanmedian(apart, axis=0)) < 1.15  # metres
+        assert take.gripper is not None and take.gripper.grippers == 2
+    hangs = np.mean([t.series.points[:, 6, 2].mean() < t.gripper.poses[:, :, 2].mean() for t in takes if t.gripper])
+    assert hangs == 1.0  # z is up
+
+
+def test_real_carried_cloths_lag_as_published() -> None:
+    takes, notes = read("carried-cloth", real("carried-cloth"))
+    assert len(takes) == len(list(real("carried-cloth").glob("*.npz")))
+    lags = [float(n.split(" by ")[1].split(" s;")[0]) for n in notes if " by " in n]
+    assert min(lags) >= 0.24 and max(lags) <= 0.38
+    for take in takes:
+        n = int(np.sqrt(take.series.points.shape[1]))
+        top, low = take.series.points[:, :n], take.series.points[:, -n:]
+        assert 0.15 < np.nanmedian(top[..., 2]) - np.nanmedian(low[..., 2]) < 0.35
+        assert take.gripper is not None
+        pose = take.gripper.at(take.series.time)[:, 0, :3]
+        assert np.nanmedian(np.linalg.norm(np.nanmean(top, axis=1) - pose, axis=1)) < 0.03
+
+
+def test_real_clouds_are_in_metres_above_the_table() -> None:
+    takes, _ = read("cloth-cloud", real("cloth-cloud"))
+    assert len(takes) == 12 and len({t.motion for t in takes}) == 6
+    for take in takes:
+        assert not take.series.correspondence
+        assert 0.04 < np.nanmin(take.series.points[..., 2]) < np.nanmax(take.series.points[..., 2]) < 0.45

@@ -1,0 +1,72 @@
+"""The cable example: every take starts through its markers, whatever shape it begins in."""
+
+import os
+import shutil
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from muslin.core.dataset import DatasetNote
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.measurement_store import save_measurement
+from muslin.core.motion import Motion
+from muslin.core.registry import REGISTRY
+from muslin.core.series import PointSeries
+from muslin.core.study import Study
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDER = ROOT / "examples/cable"
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+NAMES = ("76", "101", "93", "94", "97")
+
+
+def measured(folder: Path, takes: list[Recording]) -> Study:
+    """The study of the example with these takes."""
+    pytest.importorskip("mujoco")
+    shutil.copy(FOLDER / "study.toml", folder)
+    save_measurement(Measurement(tuple(takes)), folder / "cable1.zarr")
+    return Study.load(folder / "study.toml", workers=0)
+
+
+def bent(seed: int) -> Recording:
+    """A cable of 1.04 m, 13 markers, bent sideways as no hanging one is, its ends moved a little."""
+    rng = np.random.default_rng(seed)
+    s = np.linspace(-1.0, 1.0, 2001)
+    curve = np.stack([0.4 * s, 0.08 * np.sin(2.5 * s + seed), 0.9 + 0.25 * s**2], axis=1)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+    curve *= 1.04 / along[-1]
+    where = np.concatenate([[0.0, 0.02], np.linspace(0.1, 0.9, 9) + rng.uniform(-0.01, 0.01, 9), [0.98, 1.0]])
+    points = np.stack([np.interp(where, along / along[-1], curve[:, k]) for k in range(3)], axis=1)
+    time = np.linspace(0.0, 0.3, 31)
+    sway = np.stack([0 * time, 0.05 * (1 - np.cos(6 * time)), 0 * time], axis=1)
+    series = PointSeries(time, points + sway[:, None])
+    ends = np.stack([points[0] + sway, points[-1] + sway], axis=1)
+    return Recording(NAMES[seed], series, Motion.from_positions(time, ends))
+
+
+def test_every_take_starts_where_it_was_measured(tmp_path: Path) -> None:
+    study = measured(tmp_path, [bent(k) for k in range(5)])
+    for name, recording in study.problem.recordings.items():
+        scenario = study.problem.scenarios[name]
+        start = scenario.markers @ scenario.start_vertices()
+        assert np.linalg.norm(start - recording.series.points[0], axis=1).max() < 0.002
+        assert scenario.body.measures.sum() == pytest.approx(1.04, rel=0.005)
+    moved = study.problem.simulate({"bending_rigidity": 1e-3, "twist_rigidity": 1e-3}, "76")
+    ends = moved.series.points[:, [0, -1]] - study.problem.recordings["76"].series.points[:, [0, -1]]
+    assert np.abs(ends).max() < 0.002  # held where the grippers are
+
+
+def test_the_real_takes_of_the_example_are_there_and_can_be_simulated(tmp_path: Path) -> None:
+    path = DATA / "cable/cable1.npz"
+    if not path.exists():
+        pytest.skip("the recordings of the cable are not here; set MUSLIN_DATA to their folder")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DatasetNote)
+        takes = REGISTRY.get("dataset", "deform-cable")(path, list(NAMES))
+    study = measured(tmp_path, takes)
+    assert study.problem.fit_on == NAMES[:3] and study.problem.hold_out == NAMES[3:]
+    made = study.problem.simulate({"bending_rigidity": 1e-3, "twist_rigidity": 1e-3}, "94").series.points
+    difference = made - study.problem.recordings["94"].series.points
+    assert np.nanmean(np.abs(difference)) < 0.02  # metres
