@@ -35,6 +35,9 @@ class GivenShape:
     ) -> FloatArray:
         scale = float(body.measures.sum()) / self.measure
         local = self.about + scale * (self.vertices - self.about)
+        if len(local) != len(body.vertices):  # the same rope on a finer mesh
+            own, finer = np.arange(len(local)), np.linspace(0, len(local) - 1, len(body.vertices))
+            local = np.stack([np.interp(finer, own, x) for x in local.T], axis=1)
         return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 

@@ -8,6 +8,7 @@ import pytest
 from muslin.core.refinement import refined
 from muslin.core.scenario import marker_weights
 from muslin.core.scenarios import preset
+from muslin.core.scenarios.starts import GivenShape
 
 
 @pytest.mark.parametrize(("size", "counts"), [((0.3, 0.2), (5, 4)), ((0.8,), (9,))])
@@ -40,3 +41,14 @@ def test_a_held_edge_stays_held_all_along() -> None:
 
 def test_a_solid_is_not_refined() -> None:
     assert refined(preset("beam").scenario()) is None
+
+
+def test_a_rope_with_a_shape_of_its_own_keeps_it() -> None:
+    coarse = preset("cable").scenario((0.8,), (9,))
+    bent = coarse.body.vertices + 0.02 * np.sin(np.arange(9))[:, None] * np.array([0.0, 1.0, 0.0])
+    coarse = replace(coarse, start=GivenShape(bent, float(coarse.body.measures.sum()), bent[:2].mean(axis=0)))
+    fine = refined(coarse)
+    assert fine is not None
+    start = fine.start_vertices()
+    np.testing.assert_allclose(start[::2], coarse.start_vertices(), atol=1e-12)
+    np.testing.assert_allclose(start[1::2], (start[:-1:2] + start[2::2]) / 2, atol=1e-12)
