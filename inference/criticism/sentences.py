@@ -10,6 +10,8 @@ from .verdict import EXPLAINS
 _WORTH_TELLING = 0.2
 #: A coefficient known to this part of its size needs no better experiment.
 _KNOWN = 0.1
+#: A held-out error of so many times the noise is told where the fitted recordings show no misfit.
+_ELSEWHERE = 1.5
 
 
 def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]]) -> dict[str, str]:
@@ -23,6 +25,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
     parts = {
         "verdict": _verdict(result, effects),
         "further": _further(result),
+        "elsewhere": _elsewhere(result),
         "where": _where(result),
         "unrepeatable": _unrepeatable(result),
         "alternatives": _alternatives(result),
@@ -86,6 +89,21 @@ def _further(result: dict[str, Any]) -> str:
     return (
         f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(further)}; these data "
         "cannot tell which."
+    )
+
+
+def _elsewhere(result: dict[str, Any]) -> str:
+    """What a fit without a misfit still does not say: how the model does on other motions."""
+    error = result["error"]
+    if result["verdict"] not in ("no-misfit", "cannot-tell") or not error["held_out"]:
+        return ""
+    ratio = error["before"] / error["noise"]
+    if ratio < _ELSEWHERE:
+        return ""
+    off = length(error["before"], error["unit"])
+    return (
+        f"But on held-out motions the model is off by {off}, {ratio:.1f} times the noise: what is missing shows. "
+        "Fit on one of them too ([study] fit_on), and diagnose again."
     )
 
 
