@@ -102,17 +102,6 @@ class Objective:
         """Independent numbers that white residuals ``(N,)`` are worth."""
         return self.noise.information * (len(white) - self.discrepancy.dropped(self.recordings))
 
-    def information(self, jacobian: FloatArray) -> FloatArray:
-        """Of the data on a point of the unit cube ``(D, D)``, given the Jacobian ``(N, D)`` there.
-
-        What a derivative by differences has from chance is taken off twice, as it is not known well.
-        """
-        by_chance = 2.0 * self.noise.information * self.discrepancy.left_to_chance(self.recordings) / STEP**2
-        if by_chance == 0.0:
-            return np.asarray(jacobian.T @ jacobian)
-        values, vectors = np.linalg.eigh(jacobian.T @ jacobian)
-        return np.asarray((vectors * np.maximum(values - 2.0 * by_chance, 0.0)) @ vectors.T)
-
     def one(self, unit: FloatArray) -> FloatArray:
         """White residuals ``(N,)`` at ``unit (D,)``; a failed rollout counts as far off everywhere."""
         if self._last is None or not np.array_equal(self._last[0], unit):
@@ -194,7 +183,7 @@ def polish(
     )
     jacobian, white = np.asarray(result.jac, float), np.asarray(result.fun, float)
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
-    information = objective.information(jacobian) + 12.0 * np.eye(len(start))
+    information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
     covariance = np.asarray(np.linalg.inv(information), float)
     return Polished(np.asarray(result.x, float), covariance, jacobian, white, objective.count(white))
 
