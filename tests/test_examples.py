@@ -1,11 +1,10 @@
 """The examples: their studies resolve, and the recording in the repository is what its script makes."""
 
-import importlib.util
+import runpy
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,14 +13,6 @@ from muslin.core.measurement_store import load_measurement, read_hidden
 from muslin.core.study import Study
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
-
-
-def module(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made
 
 
 def test_the_hidden_effect_recording_is_what_its_script_makes(tmp_path: Path) -> None:
@@ -48,10 +39,10 @@ def test_the_beam_is_imported_and_its_study_resolves(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("ezc3d")
     shutil.copy(EXAMPLES / "beam/study.toml", tmp_path)
-    demo = module(EXAMPLES / "demo.py")
-    demo.import_beam(tmp_path)
+    demo = runpy.run_path(str(EXAMPLES / "demo.py"))
+    demo["import_beam"](tmp_path)
     study = Study.load(tmp_path / "study.toml")
-    assert sorted(study.measurement.names) == sorted(name for _, name, *_ in demo.BEAM)
+    assert sorted(study.measurement.names) == sorted(name for _, name, *_ in demo["BEAM"])
     for name, recording in study.problem.recordings.items():
         scenario = study.problem.scenarios[name]
         start = scenario.markers @ scenario.world_vertices()
@@ -76,9 +67,9 @@ def test_the_shirt_is_what_its_script_makes_and_swings(
     folder = EXAMPLES / "own_mesh"
     for name in ("shirt.obj", "study.toml"):
         shutil.copy(folder / name, tmp_path)
-    module(folder / "make_shirt.py").main(tmp_path / "again.obj")
+    runpy.run_path(str(folder / "make_shirt.py"))["main"](tmp_path / "again.obj")
     assert (tmp_path / "again.obj").read_text() == (folder / "shirt.obj").read_text()
-    module(folder / "swing.py").main(engine, str(tmp_path / "recording.zarr"))
+    runpy.run_path(str(folder / "swing.py"))["main"](engine, str(tmp_path / "recording.zarr"))
     assert f"{engine}: 145 vertices" in capsys.readouterr().out
     study = Study.load(tmp_path / "study.toml")
     scenario = study.problem.scenarios["swing"]

@@ -1,44 +1,19 @@
 """A rope that starts as it was measured: through the markers of the first frame, at rest."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..body import Body, rope_line
+from ..arrays import FloatArray
+from ..body import rope_line
 from ..errors import InputError
 from ..measurement import Recording
 from ..motion import inverse, rotate
-from ..obstacles import Obstacle
 from ..scenario import Scenario
+from .starts import GivenShape
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredShape:
-    """A curve carried by the first gripper, cut into segments of equal length: as many as the rope has.
-
-    Args:
-        curve: ``(K, 3)`` [m] in the frame of the first gripper at its first pose, finely sampled.
-        along: length of the curve up to each of its points ``(K,)`` [m].
-    """
-
-    curve: FloatArray
-    along: FloatArray
-
-    def __call__(
-        self,
-        body: Body,
-        poses: FloatArray,
-        grasps: tuple[IntArray, ...],
-        obstacles: tuple[Obstacle, ...],
-        clearance: float,
-    ) -> FloatArray:
-        where = np.linspace(0.0, self.along[-1], len(body.vertices))
-        local = np.stack([np.interp(where, self.along, self.curve[:, k]) for k in range(3)], axis=1)
-        return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 
 def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
@@ -67,7 +42,9 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     markers = np.zeros((len(points), count))
     markers[np.arange(len(points)), left] = 1.0 - (share - left)
     markers[np.arange(len(points)), left + 1] = share - left
-    return replace(scenario, body=body, start=MeasuredShape(local, along), markers=markers)
+    evenly = np.linspace(0.0, along[-1], len(along))
+    local = np.stack([np.interp(evenly, along, local[:, k]) for k in range(3)], axis=1)
+    return replace(scenario, body=body, start=GivenShape(local, along[-1], np.zeros(3)), markers=markers)
 
 
 def _curve(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -16,7 +16,8 @@ class GivenShape:
     """A shape that is known beforehand, carried by the first gripper.
 
     Args:
-        vertices: ``(V, 3)`` [m] in the frame of the first gripper at its first pose.
+        vertices: ``(V, 3)`` [m] in the frame of the first gripper at its first pose. Of a rope any number, at even
+            distances along it.
         measure: length of the object at rest [m]; if it is scaled, so is the shape.
         about: the point of the same frame that scaling leaves where it is ``(3,)`` [m].
     """
@@ -35,9 +36,9 @@ class GivenShape:
     ) -> FloatArray:
         scale = float(body.measures.sum()) / self.measure
         local = self.about + scale * (self.vertices - self.about)
-        if len(local) != len(body.vertices):  # the same rope on a finer mesh
-            own, finer = np.arange(len(local)), np.linspace(0, len(local) - 1, len(body.vertices))
-            local = np.stack([np.interp(finer, own, x) for x in local.T], axis=1)
+        if len(local) != len(body.vertices):  # a rope, on another mesh
+            own, wanted = np.arange(len(local)), np.linspace(0, len(local) - 1, len(body.vertices))
+            local = np.stack([np.interp(wanted, own, x) for x in local.T], axis=1)
         return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 

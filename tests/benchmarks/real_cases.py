@@ -1,13 +1,12 @@
 """The real recordings of the benchmark: how each set becomes a study."""
 
-import importlib.util
 import os
+import runpy
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from muslin.core.study import Study, read_config, write_config
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
-DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "data"))
 
 #: Takes of a cable, fitted on and held out: those that start slowest, alternately, all of their 5 s.
 CABLE_TAKES = (3, 2)
@@ -42,14 +41,6 @@ class Case:
     open_loop: bool = False
 
 
-def module(path: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    return made
-
-
 def takes_of(dataset: str, path: Path, takes: Sequence[str] = ()) -> list[Recording]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DatasetNote)
@@ -69,7 +60,7 @@ def ball(name: str) -> Case:
 
 def beam(folder: Path, workers: int | None) -> Study:
     shutil.copy(EXAMPLES / "beam/study.toml", folder)
-    module(EXAMPLES / "demo.py").import_beam(folder)
+    runpy.run_path(str(EXAMPLES / "demo.py"))["import_beam"](folder)
     return Study.load(folder / "study.toml", workers=workers)
 
 

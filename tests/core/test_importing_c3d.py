@@ -9,7 +9,7 @@ from muslin.core.importing import ImportOptions, import_file
 
 ezc3d = pytest.importorskip("ezc3d", reason="C3D needs ezc3d: pip install 'muslin[mocap]'")
 
-BEAM = Path(os.environ.get("MUSLIN_DATA", "../shared/data")) / "beam"
+BEAM = Path(os.environ.get("MUSLIN_DATA", "data")) / "beam"
 
 
 def write_c3d(path: Path, points: np.ndarray, unit: str = "mm", rate: float = 50.0) -> Path:

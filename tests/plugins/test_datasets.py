@@ -17,7 +17,7 @@ from muslin.core.registry import REGISTRY
 
 ROOT = Path(__file__).resolve().parents[2]
 DROPS = ROOT / "examples/balls/drops.csv"
-DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "data"))
 FOLDERS = {"deform-cable": "cable", "carried-cloth": "cloth_carried", "cloth-cloud": "cloth_cloud"}
 
 

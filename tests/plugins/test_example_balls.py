@@ -1,6 +1,6 @@
 """The falling balls: meshes are what their script makes, studies resolve, and heights alone can be compared."""
 
-import importlib.util
+import runpy
 import subprocess
 import sys
 from dataclasses import replace
@@ -50,11 +50,7 @@ def test_the_study_resolves_to_a_ball_of_the_right_mass(ball: str, tmp_path: Pat
 
 
 def test_the_mesh_is_as_large_from_below_as_the_ball() -> None:
-    spec = importlib.util.spec_from_file_location("make_ball", FOLDER / "make_ball.py")
-    assert spec is not None and spec.loader is not None
-    made = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(made)
-    vertices, cells = made.ball(0.2, 10.0)
+    vertices, cells = runpy.run_path(str(FOLDER / "make_ball.py"))["ball"](0.2, 10.0)
     p = vertices[cells[:, 1:]]
     level = 0.5 * np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, 2]
     assert np.abs(level).sum() / 2 == pytest.approx(np.pi * 0.2**2 / 4)

@@ -18,7 +18,7 @@ from muslin.core.study import Study
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "examples/cable"
-DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "../shared/data"))
+DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "data"))
 NAMES = ("76", "101", "93", "94", "97")
 
 
