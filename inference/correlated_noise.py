@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
-from .noise import Noise
+from .noise import Noise, ar1_noise, fourth_differences, robust_sd
 
 #: Below this correlation from frame to frame noise is taken for white, which roughness tells better.
 WHITE = 0.4
@@ -72,7 +71,7 @@ def _own(residual: FloatArray, rng: np.random.Generator) -> _Own | None:
     x = _filled(residual)
     if x.shape[0] < _FRAMES or x.shape[1] < _COLUMNS:
         return None
-    rough = 1.4826 * float(np.median(np.abs(np.diff(x, n=4, axis=0)))) / np.sqrt(70.0)
+    rough = robust_sd(fourth_differences(x))
     u, s, vt = np.linalg.svd(x, full_matrices=False)
     enough = None
     for shared in range(len(s) // 2):
@@ -110,9 +109,7 @@ def _noise(
     shape: tuple[int, ...], ar1: float, off: tuple[FloatArray, FloatArray], rng: np.random.Generator
 ) -> FloatArray:
     """AR(1) noise of unit variance without the directions ``off`` in time ``(T, K)`` and over columns ``(K, C)``."""
-    wild = rng.normal(size=shape)
-    wild[1:] *= np.sqrt(1 - ar1**2)
-    made = np.asarray(lfilter([1.0], [1.0, -ar1], wild, axis=0), float)
+    made = ar1_noise(shape, ar1, rng)
     made -= off[0] @ (off[0].T @ made)
     return np.asarray(made - (made @ off[1].T) @ off[1])
 

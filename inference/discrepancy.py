@@ -43,6 +43,10 @@ class Discrepancy:
         """How many of the residuals of ``recordings`` do not count."""
         return int(sum(np.sum(self.chance[name] > MOST_CHANCE) for name in recordings if name in self.chance))
 
+    def nothing_counts(self, recordings: Sequence[str]) -> bool:
+        """Is every residual of ``recordings`` dropped?"""
+        return all(name in self.chance and bool((self.chance[name] > MOST_CHANCE).all()) for name in recordings)
+
     def left_to_chance(self, recordings: Sequence[str]) -> float:
         """How many of those that count are chance's rather than noise's."""
         seen = [self.chance[name] for name in recordings if name in self.chance]

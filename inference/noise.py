@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
 from ..core.errors import InputError
@@ -15,6 +16,27 @@ from ..core.study import Problem
 _LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
 #: No noise of repeats is taken to be more correlated from frame to frame.
 _SLOWEST = 0.98
+
+
+def fourth_differences(x: FloatArray) -> FloatArray:
+    """Of ``x (T, ...)``, those that are finite ``(K,)``: white noise of standard deviation s leaves them that same one.
+
+    Smooth motion has next to none.
+    """
+    d = np.diff(x, n=4, axis=0) / np.sqrt(70.0)
+    return np.asarray(d[np.isfinite(d)])
+
+
+def robust_sd(x: FloatArray) -> float:
+    """Standard deviation of normal numbers, whatever a few others among them are; their mean is zero."""
+    return float(1.4826 * np.median(np.abs(x)))
+
+
+def ar1_noise(shape: tuple[int, ...], ar1: float, rng: np.random.Generator) -> FloatArray:
+    """AR(1) noise of unit variance along the first axis, ``ar1`` from frame to frame."""
+    wild = rng.normal(size=shape)
+    wild[1:] *= np.sqrt(1 - ar1**2)
+    return np.asarray(lfilter([1.0], [1.0, -ar1], wild, axis=0), float)
 
 
 @dataclass(frozen=True)
@@ -69,25 +91,18 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
         source = f"{takes} takes that are repeats"
         error = float(1 / np.sqrt(2 * max(independent, 1.0)))
     else:
-        rough = np.concatenate([_fourth_difference(r) for r in recordings])
+        corresponding = [r.series.points for r in recordings if r.series.correspondence]
+        rough = np.concatenate([fourth_differences(p) for p in corresponding] or [np.zeros(0)])
         if len(rough) < 20:
             why = "so few frames" if any(r.series.correspondence for r in recordings) else "unordered points"
             raise InputError(
                 f"the noise cannot be estimated from {why}; give it in the study: [noise] sd = 0.003 (in metres)"
             )
-        sd, correlation, source = float(1.4826 * np.median(np.abs(rough))), 0.0, "roughness in time"
+        sd, correlation, source = robust_sd(rough), 0.0, "roughness in time"
         error = float(1.2 / np.sqrt(len(rough) / 2))
     if sd <= 0:
         raise InputError("the measurement has no noise at all; give a standard deviation: [noise] sd = 0.001")
     return Noise(sd, correlation, source, unit, error)
-
-
-def _fourth_difference(recording: Recording) -> FloatArray:
-    """Standardised fourth differences: of white noise of standard deviation s they have that same one."""
-    if not recording.series.correspondence:
-        return np.zeros(0)
-    d = np.diff(recording.series.points, n=4, axis=0) / np.sqrt(70.0)
-    return np.asarray(d[np.isfinite(d)])
 
 
 def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None:

@@ -7,7 +7,7 @@ import numpy as np
 from ..core.arrays import FloatArray, IntArray
 from ..core.interpolation import interpolate
 from ..core.measurement import Recording
-from .noise import Noise
+from .noise import Noise, ar1_noise
 from .residuals import Offsets
 
 
@@ -48,11 +48,7 @@ class Observer:
         constant = rng.normal(size=axes) * self.offsets.constant
         if clock:
             clean = interpolate(time + clock, time, clean)
-        wild = rng.normal(size=clean.shape) * self.noise.sd
-        if self.noise.ar1 > 0:
-            for t in range(1, len(wild)):
-                wild[t] = self.noise.ar1 * wild[t - 1] + np.sqrt(1 - self.noise.ar1**2) * wild[t]
-        flawed = clean + constant + wild
+        flawed = clean + constant + self.noise.sd * ar1_noise(clean.shape, self.noise.ar1, rng)
         if recording.series.correspondence:
             flawed[~np.isfinite(recording.series.points)] = np.nan
         return np.asarray(flawed)

@@ -17,8 +17,8 @@ from .noise import Noise
 from .polish import STEP
 from .residuals import Offsets, by_residual
 
-#: Directions in the unit cube, each tried on both sides.
-_DIRECTIONS = 3
+#: Places along a line through the unit cube, in steps of :mod:`.polish`, and the degree of what a smooth model follows.
+_PLACES, _DEGREE = np.arange(-3.0, 4.0), 2
 
 
 def roughness(
@@ -26,8 +26,8 @@ def roughness(
 ) -> dict[str, FloatArray]:
     """Standard deviation in every frame ``(T,)`` [m or px] of what no fit can follow, by recording.
 
-    From second differences of the predictions at the step of :mod:`.polish`: a smooth model has next to none, and where
-    neighbours lie anywhere each has the variance of one rollout six times over. All points of a frame count as one.
+    What the predictions at neighbouring places leave of a parabola through them: a smooth model leaves next to nothing,
+    however much it bends. All points of a frame count as one.
 
     Args:
         pool: where rollouts run.
@@ -35,9 +35,10 @@ def roughness(
         recordings: names; one that cannot be simulated there is left out.
     """
     rng = np.random.default_rng(59)
-    middle = np.clip(unit, STEP, 1.0 - STEP)
-    sides = STEP * rng.choice([-1.0, 1.0], size=(_DIRECTIONS, len(unit)))
-    points = np.vstack([middle, middle + sides, middle - sides])
+    span = STEP * np.abs(_PLACES).max()
+    line = STEP * rng.choice([-1.0, 1.0], size=len(unit))
+    points = np.clip(unit, span, 1.0 - span) + _PLACES[:, None] * line
+    basis, _ = np.linalg.qr(np.vander(_PLACES, _DEGREE + 1))
     tasks = [Task(space.as_dict(space.from_unit(p)), name) for name in recordings for p in points]
     outcomes = iter(pool.map(tasks))
     found = {}
@@ -46,9 +47,9 @@ def roughness(
         series = [o.series for o in made if isinstance(o, Trajectory)]
         if len(series) < len(points):
             continue
-        positions = np.stack([s.points for s in series])
-        second = positions[1 : _DIRECTIONS + 1] + positions[_DIRECTIONS + 1 :] - 2 * positions[0]
-        found[name] = np.sqrt(np.nanmean(second**2, axis=(0, 2, 3)) / 6)
+        positions = np.stack([s.points for s in series]).reshape(len(points), len(series[0].time), -1)
+        rest = positions - np.tensordot(basis @ basis.T, positions, axes=1)
+        found[name] = np.sqrt(np.nanmean(np.sum(rest**2, axis=0), axis=1) / (len(points) - _DEGREE - 1))
     return found
 
 

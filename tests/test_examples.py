@@ -76,3 +76,20 @@ def test_the_shirt_is_what_its_script_makes_and_swings(
     assert len(scenario.grasps) == 1 and len(scenario.grasps[0]) == 6  # the seams of both shoulders
     np.testing.assert_allclose(study.measurement["swing"].series.points[0, scenario.grasps[0], 2], 1.0, atol=1e-6)
     study.problem.simulator.check(scenario.scene(study.problem.material, np.array([0.0, 0.0, -9.8])))
+
+
+@pytest.mark.slow
+def test_what_the_hidden_effect_study_hides_is_named(tmp_path: Path) -> None:
+    """The demo's own cloth, with its own settings; of the candidates only those that come near."""
+    pytest.importorskip("mujoco")
+    shutil.copytree(EXAMPLES / "hidden_effect/recording.zarr", tmp_path / "recording.zarr")
+    shutil.copy(EXAMPLES / "hidden_effect/study.toml", tmp_path)
+    hidden = read_hidden(tmp_path / "recording.zarr")
+    study = Study.load(tmp_path / "study.toml")
+    study.config.diagnose.candidates = ["air-drag", "viscous-damping", "added-mass", "bending-hysteresis"]
+    study.fit()
+    result = study.diagnose().result
+    assert (result["verdict"], result["effects"]) == ("named", [hidden["effect"]])
+    for name, found in result["candidates"][0]["coefficients"].items():
+        assert abs(found["mean"] - hidden["coefficients"][name]) < 4 * found["sd"]
+    assert result["error"]["after"] < 1.1 * result["error"]["noise"]

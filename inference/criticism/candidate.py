@@ -28,6 +28,8 @@ class Candidate:
         held_out_white: mean square of all of them, whitened by noise and numerics [noise variances].
         numerics: what errors of the numbers themselves explain in the fit's residuals [noise variances].
         promised: residual sum of squares that a linear model promised at the first look.
+        approached: the curvature is of a search from near here rather than of the first look.
+        refitted: polished to the end, so what it leaves is what it cannot explain.
     """
 
     name: str
@@ -38,6 +40,8 @@ class Candidate:
     held_out_white: float = float("nan")
     numerics: float = 0.0
     promised: float = float("inf")
+    approached: bool = False
+    refitted: bool = False
 
     @property
     def rss(self) -> float:

@@ -42,6 +42,7 @@ def diagnose(study: Study) -> Diagnosis:
         started = work.space(()), _fitted(study)
         pair = BeforeAfter(work, started, (found.after.space, found.after.fit.unit))
         joint = work.jointly(found.first.plain, found.after)
+        found = replace(found, after=joint.nearest)
         count = work.count
     result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
@@ -110,9 +111,10 @@ def _result(
                 "z": e.z(c),
                 "behind": c.rss - e.nearest.rss,
                 "objection": objection(e, c),
-                "held_out_before": before if held else None,
+                "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "identifiability": c.surviving if c.visible else 0.0,
+                "refitted": c.refitted,
             }
         )
     changed = found.verdict in ("named", "tied")
@@ -133,6 +135,7 @@ def _result(
         "evidence": {
             "misfit": joint.rss_plain / joint.count,
             "misfit_after": after.rss / joint.count,
+            "held_out": joint.held_out_white if held else None,
             "explained": joint.explained(after),
             "numerics": joint.nearest.numerics / joint.excess,
         },
@@ -140,6 +143,8 @@ def _result(
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,
         "budget_spent": work.cut_short,
+        # it ended before anything could be ruled out
+        "unfinished": found.verdict == "cannot-tell" and work.cut_short and not any(c.refitted for c in e.candidates),
         "seconds": seconds,
         "seed": study.config.study.seed,
     }

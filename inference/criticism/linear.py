@@ -11,7 +11,7 @@ from ..polish import Objective, Polished
 
 #: How far a coefficient is moved from zero [of its prior range]: far enough that effects with a threshold show.
 STEP = 0.1
-#: A coefficient that does nothing then is moved this far.
+#: A coefficient that does nothing then is moved this far, or to the farther end of its range.
 FAR_STEP = 0.9
 #: No solution is nearer to a face of the unit cube.
 _EDGE = 0.01
@@ -28,7 +28,7 @@ class Look:
         jacobian: of the white residuals ``(N, D)``.
         at: where the linear model of the residuals has its least square inside the cube ``(D,)``.
         rss: that square [noise variances].
-        step: how far the coefficients were moved.
+        step: how far the coefficient that was moved most was moved.
         reach: how much the largest response to that is, in units of the misfit.
     """
 
@@ -77,20 +77,22 @@ def look_at(name: str, objective: Objective, plain: Polished) -> Look:
     space, base = objective.space, len(plain.unit)
     zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(space)[base:]])
     start = np.concatenate([plain.unit, zero])
+    columns, steps = np.zeros((len(plain.white), len(zero))), np.zeros(len(zero))
     for size in (STEP, FAR_STEP):
-        steps = np.where(zero + size <= 1.0, size, -np.minimum(size, zero))
-        moved = np.repeat(start[None], len(zero), axis=0)
-        moved[np.arange(len(zero)), base + np.arange(len(zero))] += steps
-        columns = np.zeros((len(plain.white), len(zero)))
-        for k, row in enumerate(objective.many(moved)):
+        idle = np.flatnonzero(~columns.any(axis=0))
+        if not len(idle):
+            break
+        up, down = np.minimum(size, 1.0 - zero[idle]), np.minimum(size, zero[idle])
+        steps[idle] = np.where(up >= down, up, -down)
+        moved = np.repeat(start[None], len(idle), axis=0)
+        moved[np.arange(len(idle)), base + idle] += steps[idle]
+        for k, row in zip(idle, objective.many(moved), strict=True):
             if row is not None:
                 columns[:, k] = (row - plain.white) / steps[k]
-        if columns.any():
-            break
     jacobian = np.hstack([plain.jacobian, columns])
     at, rss = least_square(start, plain.white, jacobian)
     reach = float(np.max(np.linalg.norm(columns * steps, axis=0)) / np.sqrt(plain.rss))
-    return Look(name, space, start, jacobian, at, rss, size, reach)
+    return Look(name, space, start, jacobian, at, rss, float(np.abs(steps).max()), reach)
 
 
 def least_square(unit: FloatArray, white: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, float]:

@@ -1,6 +1,7 @@
 """How far the model's own numbers may be off: directions from a finer step, a finer mesh, and another engine."""
 
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
@@ -47,14 +48,11 @@ def numerical_directions(
             variants.append((replace(problem, simulator=simulator), 1.0))
     as_it_is = _predicted(pool, values, names)
     columns: dict[str, list[FloatArray]] = {n: [] for n in names}
-
-    def played(variant: Problem) -> dict[str, PointSeries]:
-        # a few rollouts: starting more than one process would take longer
-        with SimulationPool(variant, min(1, pool.workers)) as elsewhere:
-            return _predicted(elsewhere, values, names)
-
-    with ThreadPoolExecutor(max(1, pool.workers)) as threads:  # that wait for those processes
-        others = list(threads.map(played, [variant for variant, _ in variants]))
+    with ExitStack() as stack:  # an interruption ends the processes first, then the threads that wait for them
+        threads = stack.enter_context(ThreadPoolExecutor(max(1, pool.workers)))
+        # a few rollouts each: starting more than one process would take longer
+        pools = [stack.enter_context(SimulationPool(variant, min(1, pool.workers))) for variant, _ in variants]
+        others = list(threads.map(lambda elsewhere: _predicted(elsewhere, values, names), pools))
     for (_, size), made in zip(variants, others, strict=True):
         for name in made.keys() & as_it_is.keys():
             columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)

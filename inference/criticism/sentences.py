@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from ...core.effect import Effect
 from ...core.study import Study
 from .verdict import EXPLAINS
@@ -25,6 +27,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
     parts = {
         "verdict": _verdict(result, effects),
         "further": _further(result),
+        "budget": _budget(result),
         "elsewhere": _elsewhere(result),
         "where": _where(result),
         "unrepeatable": _unrepeatable(result),
@@ -77,6 +80,12 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
             f"No misfit: the model differs from the measurement by {ratio:.2f} times the noise of "
             f"{length(error['noise'], error['unit'])}, which is what noise alone does."
         )
+    if result["unfinished"]:
+        return (
+            f"Cannot tell yet: the model misses something, {ratio:.1f} times the noise, but the budget ended after "
+            f"{result['simulations']} simulations, before any candidate was refitted; the ranking is what a first look "
+            "promises."
+        )
     return (
         "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were missing."
     )
@@ -95,15 +104,25 @@ def _further(result: dict[str, Any]) -> str:
 def _elsewhere(result: dict[str, Any]) -> str:
     """What a fit without a misfit still does not say: how the model does on other motions."""
     error = result["error"]
-    if result["verdict"] not in ("no-misfit", "cannot-tell") or not error["held_out"]:
+    if result["verdict"] not in ("no-misfit", "cannot-tell") or result["unfinished"] or not error["held_out"]:
         return ""
-    ratio = error["before"] / error["noise"]
-    if ratio < _ELSEWHERE:
+    ratio = result["evidence"]["held_out"] ** 0.5
+    if np.isnan(ratio) or ratio < _ELSEWHERE:
         return ""
-    off = length(error["before"], error["unit"])
+    if np.isinf(ratio):
+        return "But held-out motions cannot be simulated with what was fitted, so nothing is said of them."
     return (
-        f"But on held-out motions the model is off by {off}, {ratio:.1f} times the noise: what is missing shows. "
-        "Fit on one of them too ([study] fit_on), and diagnose again."
+        f"But on held-out motions the model is {ratio:.1f} times the noise off, beyond what its numerics and chance "
+        "explain: what is missing shows there. Fit on one of them too ([study] fit_on), and diagnose again."
+    )
+
+
+def _budget(result: dict[str, Any]) -> str:
+    if not result["budget_spent"] or result["verdict"] not in ("none", "tied"):
+        return ""
+    return (
+        f"The budget cut the search short, after {result['simulations']} simulations: with more of them "
+        "([diagnose] simulations) a candidate may come nearer."
     )
 
 
@@ -176,6 +195,8 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
             f"To learn more: muslin unknown {study.path} estimates the missing force itself, shows it on the object, "
             "and looks for a law."
         )
+    if result["unfinished"]:
+        return "To be sure: allow several times as many simulations ([diagnose] simulations), and diagnose again."
     if verdict == "cannot-tell":
         return f"To be sure: record a motion that excites the object more; muslin next {study.path} proposes one."
     if verdict == "named":

@@ -19,10 +19,8 @@ FEW_POINTS = 3
 FAR_OFF = 3.0
 #: How many candidates pass the screening, and the first polish: by what they reach, and as many by what they promise.
 SCREENED, CONTENDERS = 5, 3
-#: The candidates that are polished to the end: this many, and all that explain half of what the best does.
-FINALISTS = 2
-#: Further starts from which what was named is polished.
-RESTARTS = 2
+#: The candidates that are polished to the end: this many, and all that explain this share of what the best does.
+FINALISTS, NEARLY = 2, 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +69,7 @@ def run_stage(work: Work, effects: tuple[str, ...], names: list[str], start: Flo
             again = work.polished(effects, best.fit.unit[: len(plain.unit)], MORE_EVALUATIONS)
             plain = min(plain, again, key=lambda p: p.rss)
         evidence = work.evidence(effects, plain, candidates)
-    stage = Stage(effects, plain, looks, evidence, decide(evidence))
-    return _again(work, stage) if stage.decision.verdict == "named" else stage
+    return Stage(effects, plain, looks, evidence, decide(evidence))
 
 
 def _seen_only(look: Look, plain: Polished) -> Candidate:
@@ -118,12 +115,12 @@ class _Tournament:
             there = self.moved(found[name], goals[name][0][None])
             found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         order = sorted(found.values(), key=lambda c: c.rank)
-        half = (self.plain.rss + order[0].rss) / 2
+        near = self.plain.rss - NEARLY * (self.plain.rss - order[0].rss)
         for k, c in enumerate(order):
-            if (k < FINALISTS or c.rss < half) and self.work.may_go_on():
+            if (k < FINALISTS or c.rss < near) and self.work.may_go_on():
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
-                found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
+                found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True)
         return [found[name] for name in self.looks]
 
     def rescaled(self, candidate: Candidate, look: Look) -> Candidate:
@@ -133,15 +130,15 @@ class _Tournament:
         derivative tells.
         """
         objective = self.work.objective((*self.effects, candidate.name))
-        size, largest = np.sqrt(FAR_OFF / look.reach) * look.step, look.step
-        smallest = size * size / largest
+        smallest, largest = look.step / look.reach, look.step
+        size = float(np.sqrt(smallest * largest))
         for _ in range(FEW_POINTS):
             if not self.work.may_go_on():
                 break
             point = look.along(size)
             white = objective.many(point[None])[0]
             if white is not None and float(white @ white) < candidate.rss:
-                candidate = replace(candidate, fit=look.as_fit(self.plain, point, white))
+                candidate = replace(candidate, fit=look.as_fit(self.plain, point, white), approached=False)
             moved = np.inf if white is None else float(np.linalg.norm(white - self.plain.white))
             if moved > np.sqrt(self.plain.rss):
                 largest = size
@@ -164,38 +161,19 @@ class _Tournament:
         best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
         if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
             return candidate
-        return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]))
+        return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]), approached=False)
 
     def approached(self, candidate: Candidate, evaluations: int) -> Candidate:
         """Some way towards the least square; derivatives are those of an earlier approach to the same point."""
         if not self.work.may_go_on():
             return candidate
-        seen_only = candidate.fit.jacobian is self.looks[candidate.name].jacobian
-        known = None if seen_only else candidate.fit.jacobian
+        known = candidate.fit.jacobian if candidate.approached else None
         effects = (*self.effects, candidate.name)
         fit = self.work.roughly_polished(effects, candidate.fit.unit, evaluations, known)
-        return replace(candidate, fit=min(fit, candidate.fit, key=lambda p: p.rss))
+        return candidate if candidate.rss <= fit.rss else replace(candidate, fit=fit, approached=True)
 
 
 def _leaders(reached: dict[str, float], promised: dict[str, float], count: int) -> list[str]:
     """The names with the smallest numbers of either kind."""
     leaders = {*sorted(reached, key=reached.__getitem__)[:count], *sorted(promised, key=promised.__getitem__)[:count]}
     return [name for name in reached if name in leaders]
-
-
-def _again(work: Work, stage: Stage) -> Stage:
-    """Polish what was named from other starts too: what a fit in a side valley leaves is no second effect.
-
-    Only once the verdict stands: of all candidates the leader alone would have it easier than its rivals.
-    """
-    c = stage.chosen
-    if stage.evidence.left(c) == 0.0 or not work.may_go_on():
-        return stage
-    effects = (*stage.effects, c.name)
-    rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
-    points = screening_points(c.space, c.base, c.fit.unit[None, : c.base], work.study.config.diagnose.draws, rng)
-    starts = best_starts(work.objective(effects), points)[:RESTARTS]
-    fits = [c.fit, *(work.polished(effects, unit, MORE_EVALUATIONS) for unit, _ in starts)]
-    better = work.judged(replace(c, fit=min(fits, key=lambda p: p.rss)))
-    candidates = tuple(better if other is c else other for other in stage.evidence.candidates)
-    return replace(stage, evidence=replace(stage.evidence, candidates=candidates))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from ...core.arrays import FloatArray
 from .candidate import Candidate
+from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
 from .verdict import MARGIN, SHARE_LEFT, SIGNIFICANT, Verdict
 from .work import Work
@@ -50,6 +51,7 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
         return Findings("tied", first.decision.effects, first, first, first.chosen)
     if verdict != "named":
         return Findings(verdict, (), first, first, _nearest(first))
+    first = settled(work, first)
     return _forward(work, names, Findings("named", first.decision.effects, first, first, first.chosen))
 
 
@@ -60,10 +62,13 @@ def _forward(work: Work, names: list[str], found: Findings) -> Findings:
         if not rest:
             break
         stage = run_stage(work, found.effects, rest, found.after.fit.unit)
+        # the same model, fitted to the end, and its numerics looked at where it fits
+        found = replace(found, after=work.judged(replace(found.after, fit=stage.plain)))
         if stage.decision.verdict == "tied":
             return replace(found, further=stage.decision.effects)
         if stage.decision.verdict != "named":
             break
+        stage = settled(work, stage)
         effects = (*found.effects, stage.chosen.name)
         found = _without_idle(work, replace(found, effects=effects, last=stage, after=stage.chosen))
         if len(found.effects) < len(effects):
@@ -80,6 +85,8 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
         if not work.may_go_on() or not rest:
             return None
         stage = run_stage(work, (lead.name,), rest, lead.fit.unit)
+        if stage.decision.verdict == "named":
+            stage = settled(work, stage)
         if stage.decision.verdict == "named" and work.jointly(first.plain, stage.chosen).accounted(stage.chosen):
             pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
             return _forward(work, names, _without_idle(work, pair))

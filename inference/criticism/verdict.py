@@ -141,6 +141,8 @@ def decide(e: Evidence) -> Decision:
     if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
         seen = sum(c.visible for c in e.candidates)
         return Decision("no-misfit" if 2 * seen >= len(e.candidates) else "cannot-tell", ())
+    if not any(c.refitted for c in passing or e.candidates):  # then nothing can be ruled out
+        return Decision("cannot-tell", ())
     if not passing:
         return Decision("none", ())
     best = passing[0]

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.arrays import FloatArray
+from ...core.errors import MuslinError
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import NONE, Discrepancy
@@ -73,13 +74,21 @@ class Work:
         self.rough = roughness(self.pool, space, unit, names)
         chance = chance_of(self.rough, self.problem.recordings, self.fit.noise, self.offsets)
         self.discrepancy = Discrepancy(directions, chance)
+        if self.discrepancy.nothing_counts(self.problem.fit_on):
+            raise MuslinError(
+                "nothing in the fitted recordings can be diagnosed: in every frame next to nothing in the parameters "
+                "moves the model by more than the noise; fit on motions that can be repeated (in the air, trailing), "
+                "or on the part before contact (muslin import --stop)"
+            )
         self._elsewhere += cost
 
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """A least-squares fit of the model with ``effects``, of as many evaluations as the budget has left."""
         objective = self.objective(effects)
         each = (1 + len(objective.space)) * len(self.problem.fit_on)
-        return polish(objective, start, max(1, min(evaluations, (self.limit - self.count) // each)))
+        left = max(1, (self.limit - self.count) // each)
+        self.cut_short |= left < evaluations
+        return polish(objective, start, min(evaluations, left))
 
     def roughly_polished(
         self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None
@@ -104,8 +113,15 @@ class Work:
 
     def jointly(self, plain: Polished, after: Candidate) -> Evidence:
         """The model as it was beside all that was found, both whitened by the numerics as last seen."""
-        again = self.objective(()).one(plain.unit)
-        return self.evidence((), replace(plain, white=again), [after])
+        effects = tuple(dict.fromkeys(n.split(".", 1)[0] for n in after.space.names if "." in n))
+        later = replace(after, fit=self._again(effects, after.fit))
+        return self.evidence((), self._again((), plain), [later])
+
+    def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
+        """The same point with residuals that are whitened as they are now."""
+        objective = self.objective(effects)
+        white = objective.one(fit.unit)
+        return replace(fit, white=white, count=objective.count(white))
 
     def judged(self, candidate: Candidate) -> Candidate:
         """With its held-out errors, and what the numerics explain in its residuals [noise variances]."""

@@ -1,12 +1,10 @@
 """What makes the numbers of a fit doubtful, found out with a few more rollouts."""
 
-import numpy as np
-
 from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import SimulationPool, Task
-from ..noise import Noise
+from ..noise import Noise, fourth_differences, robust_sd
 from ..roughness import roughness, unrepeatable
 
 
@@ -33,8 +31,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
         )
     if noise.source.startswith("roughness"):
-        rough_in_time = np.diff(plain.series.points, n=4, axis=0) / np.sqrt(70.0)
-        own = float(1.4826 * np.median(np.abs(rough_in_time)))
+        own = robust_sd(fourth_differences(plain.series.points))
         if own > 0.5 * noise.sd:
             out.append(
                 "the motion is fast for the frame rate and passes for noise, which is overestimated; "

@@ -134,6 +134,8 @@ def _polished(
     # what cannot be repeated there must not lead the fit
     rough = roughness(pool, space, nearest, names)
     discrepancy = Discrepancy(chance=chance_of(rough, problem.recordings, noise, offsets))
+    if discrepancy.nothing_counts(names):  # then the nearest is as good as it gets; doubts say that it is chance
+        discrepancy = NONE
     objective = Objective(pool, space, names, noise, offsets, discrepancy=discrepancy)
     best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto, discrepancy))
     return best, doubts(pool, space, best.unit, noise)

@@ -30,8 +30,6 @@ class Takes:
 
     def __init__(self, observer: Observer, scenarios: Mapping[str, Scenario]) -> None:
         self._observer = observer
-        # coordinates that no recording has, as those of a video of heights: the same nothing in every draw
-        self._unmeasured = np.all([~np.isfinite(p).any(axis=(0, 1)) for p in observer.measured()], axis=0)
         self._groups: list[list[int]] = []
         recordings = observer.recordings
         for i, recording in enumerate(recordings):
@@ -44,6 +42,9 @@ class Takes:
                     break
             else:
                 self._groups.append([i])
+        # coordinates that no take of a motion has, as those of a video of heights: the same nothing in every draw
+        missing = [~np.isfinite(p).any(axis=(0, 1)) for p in observer.measured()]
+        self._unmeasured = [np.all([missing[i] for i in group], axis=0) for group in self._groups]
 
     @property
     def simulated(self) -> list[str]:
@@ -89,7 +90,7 @@ class Takes:
                 seen = np.isfinite(takes)
                 total, count = np.where(seen, takes, 0.0).sum(axis=0), seen.sum(axis=0)
                 out.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-        return [np.where(self._unmeasured, 0.0, a) for a in out]
+        return [np.where(unmeasured, 0.0, a) for unmeasured, a in zip(self._unmeasured, out, strict=True)]
 
 
 def _same(a: Scenario, b: Scenario) -> bool:

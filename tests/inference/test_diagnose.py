@@ -17,11 +17,11 @@ pytest.importorskip("mujoco")
 
 SCHEMA = {
     "verdict", "effects", "further", "candidates", "error", "evidence", "unrepeatable", "where", "told", "simulations",
-    "budget_spent", "seconds", "seed",
+    "budget_spent", "unfinished", "seconds", "seed",
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
-    "identifiability",
+    "identifiability", "refitted",
 }  # fmt: skip
 ERROR = {"noise", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
 

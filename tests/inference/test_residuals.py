@@ -7,7 +7,7 @@ import pytest
 
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
-from muslin.inference.noise import Noise, _fourth_difference, _from_repeats
+from muslin.inference.noise import Noise, _from_repeats, fourth_differences
 from muslin.inference.residuals import Offsets, failed, residual
 
 TIME = np.arange(0, 2, 0.02)
@@ -70,7 +70,7 @@ def test_correlated_noise_counts_less() -> None:
 def test_roughness_finds_the_noise_of_a_smooth_motion(sd: float) -> None:
     rng = np.random.default_rng(3)
     recording = Recording("a", PointSeries(TIME, wave() + rng.normal(0, sd, wave().shape)))
-    d = _fourth_difference(recording)
+    d = fourth_differences(recording.series.points)
     assert 1.4826 * np.median(np.abs(d)) == pytest.approx(sd, rel=0.15)
 
 

@@ -1,5 +1,7 @@
 """The five verdicts, from made-up evidence: each bar is what decides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -22,7 +24,7 @@ def candidate(
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
     white = np.full(int(COUNT), np.sqrt(rss / COUNT))
     fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, COUNT)
-    return Candidate(name, space, 1, fit, {"other": held_out}, (held_out / 0.003) ** 2, numerics)
+    return Candidate(name, space, 1, fit, {"other": held_out}, (held_out / 0.003) ** 2, numerics, refitted=True)
 
 
 def evidence(rss: float, *candidates: Candidate, held_out: float = 0.010) -> Evidence:
@@ -60,6 +62,12 @@ def test_not_named_when_much_is_left_that_neither_noise_nor_numerics_make() -> N
 
 def test_none_when_nothing_explains_half() -> None:
     assert decide(evidence(9 * COUNT, candidate("drag", 6 * COUNT), candidate("wind", 8 * COUNT))).verdict == "none"
+
+
+def test_nothing_is_ruled_out_that_was_not_refitted() -> None:
+    looked_at = [replace(candidate(n, 9 * COUNT), refitted=False) for n in ("drag", "wind")]
+    assert decide(evidence(9 * COUNT, *looked_at)).verdict == "cannot-tell"
+    assert decide(evidence(9 * COUNT, looked_at[0], candidate("wind", 9 * COUNT))).verdict == "none"
 
 
 def test_not_named_when_the_held_out_motion_gets_worse() -> None:
