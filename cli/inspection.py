@@ -46,7 +46,7 @@ def _status(row: PluginInfo) -> str:
 
 
 def check(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of a simulator, extractor, estimator or effect.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of a plugin, as muslin plugins lists it.")],
 ) -> None:
     """Run the conformance kit on a plugin. Exit status 0 if all checks pass, 1 if one fails."""
     kinds = [kind for kind in GROUPS if name in REGISTRY.names(kind)]

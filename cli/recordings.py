@@ -1,10 +1,10 @@
 """``muslin import``: files of other programs to one measurement."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 import typer
@@ -19,7 +19,8 @@ from ..core.scenarios import PRESETS
 from .console import command, next_step, say
 
 T = TypeVar("T")
-_EACH = "Once for all files, or once a file, in their order."
+_FILES = "markers.c3d, points.npz or track.csv; with --dataset the one file or folder of that set."
+_EACH = "Once for all files (takes of a set), or once each, in their order."
 
 
 def add_to(app: typer.Typer) -> None:
@@ -28,7 +29,7 @@ def add_to(app: typer.Typer) -> None:
 
 
 def import_files(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="markers.c3d, points.npz or track.csv.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help=_FILES)],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="RECORDING.zarr", help="The measurement to write, a Zarr store.")
     ],
@@ -96,42 +97,42 @@ def import_files(
     """
     if output.exists() and not force:  # said before a long file is read
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
-    options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
-    recordings: list[Recording] = []
-    if dataset is not None:
-        known: dict[str, object] = {
-            "--name": name,
-            "--motion": motion,
-            "--load": load,
-            "--gripper": gripper,
-            "--unit": unit,
-        }
-        known |= {"--up": up != "z", "--correspondence": correspondence is not None}
-        if wrong := [option for option, given in known.items() if given]:
+    if dataset is None:
+        if take:
+            raise InputError("--take names takes of a published set; say which set with --dataset")
+        options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
+        each = {"start": start, "stop": stop, "motion": motion, "load": load, "gripper": gripper, "name": name}
+        recordings, scenario = _of_files(files, options, each), "fling"
+    else:
+        own: dict[str, object] = {"--name": name, "--motion": motion, "--load": load, "--gripper": gripper}
+        own |= {"--unit": unit, "--up": up != "z", "--correspondence": correspondence is not None}
+        if wrong := [option for option, given in own.items() if given]:
             raise InputError(f"{wrong[0]} does not go with --dataset, which knows that itself; leave it out")
-        recordings = _of_dataset(dataset, files, take or [], start, stop)
-    elif take:
-        raise InputError("--take names takes of a published set; say which set with --dataset")
-    for k, file in enumerate(files if dataset is None else []):
-        own = replace(
-            options,
-            start=_each(start, k, files, "--start"),
-            stop=_each(stop, k, files, "--stop"),
-            motion=_each(motion, k, files, "--motion"),
-            load=_each(load, k, files, "--load"),
-            gripper=_each(gripper, k, files, "--gripper"),
-            name=_name(name, k, files),
-        )
-        recordings += import_file(file, own)
+        recordings, scenario = _of_dataset(dataset, files, take or [], start, stop), "NAME"  # none suits every set
     measurement = Measurement(tuple(recordings))
     save_measurement(measurement, output, overwrite=force)
     say(f"wrote {output}")
     for recording in measurement.recordings:
         say("  " + _summary(recording))
     next_step(
-        command("new", "study.toml", "--measurement", output, "--scenario", "fling", "--simulator", "mujoco"),
+        command("new", "study.toml", "--measurement", output, "--scenario", scenario, "--simulator", "mujoco"),
         note=f"scenarios: {', '.join(PRESETS)}",
     )
+
+
+def _of_files(
+    files: Sequence[Path], options: ImportOptions, each: Mapping[str, Sequence[Any] | None]
+) -> list[Recording]:
+    """What the files hold; ``each`` are options that are given once, or once a file."""
+    names = each["name"]
+    if names and len(names) == 1 and len(files) > 1:
+        raise InputError(f"--name is given once for {len(files)} files; give it once a file, in their order")
+    told = {option: _each(values, len(files), f"--{option}", "file") for option, values in each.items()}
+    recordings: list[Recording] = []
+    for k, file in enumerate(files):
+        own: dict[str, Any] = {option: values[k] for option, values in told.items()}
+        recordings += import_file(file, replace(options, **own))
+    return recordings
 
 
 def _of_dataset(
@@ -149,30 +150,18 @@ def _of_dataset(
             say(str(warning.message))
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    for option, values in (("--start", start), ("--stop", stop)):
-        if values and len(values) not in (1, len(recordings)):
-            raise InputError(f"{option} is given {len(values)} times for {len(recordings)} takes; once, or once a take")
-    return [cropped(r, _of(start, k), _of(stop, k)) for k, r in enumerate(recordings)]
+    starts = _each(start, len(recordings), "--start", "take")
+    stops = _each(stop, len(recordings), "--stop", "take")
+    return [cropped(r, a, b) for r, a, b in zip(recordings, starts, stops, strict=True)]
 
 
-def _of(values: Sequence[float] | None, k: int) -> float | None:
-    return None if not values else values[0] if len(values) == 1 else values[k]
-
-
-def _each(values: Sequence[T] | None, k: int, files: Sequence[Path], option: str) -> T | None:
-    if not values:
-        return None
-    if len(values) == 1:
-        return values[0]
-    if len(values) != len(files):
-        raise InputError(f"{option} is given {len(values)} times for {len(files)} files; give it once, or once a file")
-    return values[k]
-
-
-def _name(names: Sequence[str] | None, k: int, files: Sequence[Path]) -> str | None:
-    if names and len(names) == 1 and len(files) > 1:
-        raise InputError(f"--name is given once for {len(files)} files; give it once a file, in their order")
-    return _each(names, k, files, "--name")
+def _each(values: Sequence[T] | None, count: int, option: str, what: str) -> Sequence[T | None]:
+    """One value for each of ``count`` files or takes."""
+    if not values or len(values) == 1:
+        return [values[0] if values else None] * count
+    if len(values) != count:
+        raise InputError(f"{option} is given {len(values)} times for {count} {what}s; give it once, or once a {what}")
+    return values
 
 
 def _summary(recording: Recording) -> str:

@@ -87,6 +87,8 @@ def diagnose(
         next_step(command("add", effects[0], study, "-o", output), *further, command("report", study))
     else:
         further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])
+        if verdict.get("unfinished"):
+            further = []
         next_step(*(command(step, study) for step in further), command("report", study))
 
 
@@ -113,11 +115,6 @@ def add(
         raise InputError(f"name either the effect {effect!r} or a law, not both: muslin add --law FILE STUDY.toml")
     if law is None and study is None:
         raise InputError(f"name an effect and a study, or a law file and a study; got {effect!r} alone")
-    if law is None and not REGISTRY.get("effect", effect).candidate:
-        raise InputError(
-            f"{effect!r} stands for a law that muslin unknown has found: muslin unknown {study} --json law.json, then "
-            f"muslin add --law law.json {study}"
-        )
     source, what = (Path(effect), f"the law of {law}") if study is None else (study, effect)
     name = effect if law is None else "law"
     target = output or source.with_name(f"{source.stem}-with-{name}.toml")

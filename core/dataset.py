@@ -1,12 +1,15 @@
 """Datasets: recordings that others published, read by name."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+import numpy.typing as npt
+from numpy.lib.npyio import NpzFile
 
 from .arrays import FloatArray
 from .errors import InputError, MissingFileError
@@ -80,50 +83,98 @@ def cropped(recording: Recording, start: float | None, stop: float | None) -> Re
     return replace(recording, series=replace(recording.series, time=time[keep], points=points))
 
 
+@contextmanager
+def about(path: Path) -> Iterator[None]:
+    """Say of what is wrong in this block in which file it is."""
+    try:
+        yield
+    except InputError as error:
+        if str(path) in str(error):
+            raise
+        raise InputError(f"{path}: {error}") from error
+
+
 def archives(path: Path, keys: Sequence[str]) -> dict[str, Path]:
     """NPZ files by name without suffix: ``path`` itself, or those in it that hold arrays of all names ``keys``.
 
+    Of each only the list of its arrays is read. Files of a folder that are of another kind are left out with a
+    :func:`note`.
+
     Raises:
         MissingFileError: there is no such file or folder.
-        InputError: none of it is such a file; says what is missing.
+        InputError: one is damaged, or none of them is such a file; says what is missing.
     """
     if not path.exists():
         raise MissingFileError(f"there is no file or folder {path}")
     files = sorted(path.glob("*.npz")) if path.is_dir() else [path]
     if not files:
         raise InputError(f"{path} holds no .npz file; name the folder of the recordings, or one of them")
+    lacking: dict[Path, str] = {}
     for file in files:
-        arrays(file, keys)
-    return {file.stem: file for file in files}
+        with _opened(file) as archive:
+            if complaint := _lacks(file, archive, keys):
+                lacking[file] = complaint
+    if len(lacking) == len(files):
+        raise InputError(lacking[files[0]])
+    if lacking:
+        names = ", ".join(file.name for file in lacking)
+        note(f"left out {names}: without one of the arrays {', '.join(keys)}, so not of this set")
+    return {file.stem: file for file in files if file not in lacking}
 
 
-def arrays(path: Path, keys: Sequence[str]) -> dict[str, FloatArray]:
-    """Arrays of one NPZ file by name, numbers as float64, ``keys`` among them.
+def arrays(path: Path, keys: Sequence[str], optional: Sequence[str] = ()) -> dict[str, npt.NDArray[Any]]:
+    """Arrays of one NPZ file by name: all ``keys``, and those of ``optional`` that are there. Others are not read.
 
     Raises:
-        InputError: not such a file, or an array is missing.
+        InputError: not such a file, or an array is missing or holds Python objects.
     """
+    with _opened(path) as archive:
+        if complaint := _lacks(path, archive, keys):
+            raise InputError(complaint)
+        return {name: _read(path, archive, name) for name in (*keys, *optional) if name in archive.files}
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[NpzFile]:
     try:
         with np.load(path, allow_pickle=False) as archive:
-            missing = [key for key in keys if key not in archive.files]
-            if missing:
-                found = ", ".join(archive.files) or "nothing"
-                raise InputError(f"{path} has no array {missing[0]!r}; it needs {', '.join(keys)}, and has {found}")
-            made = {name: np.asarray(archive[name]) for name in archive.files}
+            yield archive
     except InputError:
         raise
     except Exception as error:  # a damaged archive fails in many ways, none of them the caller's to know
         raise InputError(f"{path} is not an NPZ archive, or damaged ({type(error).__name__}); copy it again") from error
-    return {name: a.astype(np.float64) if a.dtype.kind in "fiu" else a for name, a in made.items()}
 
 
-def shaped(array: FloatArray, shape: Sequence[int | None], name: str, path: Path) -> FloatArray:
-    """``array`` if it has this shape; None stands for any count.
+def _lacks(path: Path, archive: NpzFile, keys: Sequence[str]) -> str:
+    missing = [key for key in keys if key not in archive.files]
+    if not missing:
+        return ""
+    found = ", ".join(archive.files) or "nothing"
+    return f"{path} has no array {missing[0]!r}; it needs {', '.join(keys)}, and has {found}"
+
+
+def _read(path: Path, archive: NpzFile, name: str) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(archive[name])
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        raise InputError(
+            f"{path}: array {name!r} holds Python objects, which are not read because they may run code; save it as "
+            "plain numbers or texts"
+        ) from error
+
+
+def shaped(array: npt.NDArray[Any], shape: Sequence[int | None], name: str, path: Path) -> FloatArray:
+    """``array`` as float64 if it holds real numbers and has this shape; None stands for any count.
 
     Raises:
-        InputError: it has another.
+        InputError: it holds something else, or has another shape.
     """
+    if array.dtype.kind not in "fiu":
+        raise InputError(f"{path}: {name} must hold real numbers, but holds {array.dtype}")
     if array.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, array.shape, strict=True)):
         wanted = ", ".join("any" if s is None else str(s) for s in shape)
-        raise InputError(f"{path}: {name} must have shape ({wanted}), but has {array.shape}")
-    return array
+        needed = f"have shape ({wanted})" if shape else "be one number"
+        raise InputError(f"{path}: {name} must {needed}, but has shape {array.shape}")
+    return array.astype(np.float64)

@@ -43,7 +43,7 @@ class Motion:
 
     Args:
         times: ``(K,)`` [s], rising.
-        poses: ``(K, G, 7)``: position x y z [m] and quaternion w x y z.
+        poses: ``(K, G, 7)``: position x y z [m] and quaternion w x y z, all of them known.
     """
 
     times: FloatArray
@@ -53,6 +53,13 @@ class Motion:
         if self.times.ndim != 1 or self.poses.shape[:1] != self.times.shape or self.poses.shape[2:] != (7,):
             raise InputError(
                 f"a motion needs times (K,) and poses (K, G, 7), got {self.times.shape} and {self.poses.shape}"
+            )
+        known = np.isfinite(self.poses).all(axis=2) & np.isfinite(self.times)[:, None]
+        if not known.all():
+            k, g = (int(i) for i in np.argwhere(~known)[0])
+            raise InputError(
+                f"the pose of gripper {g} at time[{k}] = {self.times[k]:g} s is not a finite number; leave out the "
+                "times at which a pose is not known"
             )
         if len(self.times) > 1 and not (np.diff(self.times) > 0).all():
             k = int(np.argmin(np.diff(self.times) > 0)) + 1

@@ -174,8 +174,17 @@ class Study:
             overwrite: replace a file that is there.
             coefficients: fixed values and priors, as the study file takes them; those not named are inferred under
                 the effect's own priors.
+
+        Raises:
+            InputError: the study has it already, the file is there, or the effect is no candidate, which must be
+                told its coefficients: all of them at once are more than recordings tell.
         """
-        REGISTRY.get("effect", effect)
+        if not REGISTRY.get("effect", effect).candidate and coefficients is None:
+            raise InputError(
+                f"{effect!r} must be told which of its coefficients to infer: give them to Study.add, or add a law "
+                f"that muslin unknown has found: muslin unknown {self.path} --json law.json, then "
+                f"muslin add --law law.json {self.path}"
+            )
         if effect in self.config.effects:
             raise InputError(f"{self.path} has {effect!r} already")
         path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")

@@ -8,6 +8,7 @@
         check_simulator(MySimulator)
 """
 
+from .datasets import check_dataset
 from .effects import check_effect
 from .estimators import check_estimator
 from .extractors import check_extractor
@@ -17,6 +18,7 @@ from .simulators import check_simulator
 
 __all__ = [
     "KITS",
+    "check_dataset",
     "check_effect",
     "check_estimator",
     "check_extractor",

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from .checks import Check, run_all
+from .datasets import dataset_checks
 from .effects import effect_checks
 from .estimators import installed_estimator_checks
 from .extractors import extractor_checks
@@ -17,6 +18,7 @@ KITS: dict[str, Callable[[Any], list[Check]]] = {
     "effect": effect_checks,
     "renderer": renderer_checks,
     "estimator": installed_estimator_checks,
+    "dataset": dataset_checks,
 }
 
 

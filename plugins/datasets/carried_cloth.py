@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.dataset import archives, arrays, chosen, note, shaped
+from ...core.dataset import about, archives, arrays, chosen, note, shaped
 from ...core.errors import InputError
 from ...core.interpolation import interpolate
 from ...core.measurement import Recording
@@ -18,6 +18,10 @@ from .carried_turns import carried_turns
 HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
 #: Lags of the camera behind the gripper that are tried [s]: beyond what was found, both ways.
 LAGS = np.arange(-0.6, 0.6001, 0.01)
+#: Hand and cloth must correlate this much at some lag [1]: in the published takes it is 0.90 at least.
+ALIKE = 0.8
+#: What goes no farther than this about its middle, root mean square, rests [m]: the published hands go 78 mm and more.
+RESTS = 0.005
 
 
 def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
@@ -27,23 +31,29 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
     index of axis 2 in the file, along x. The gripper is the middle of the top edge and turns with the hand: where it is
     in the hand is the median over the recording, in which a constant offset between camera and robot goes too. The
     camera's clock lags the robot's; the lag is the one at which the top edge moves most like the hand, and points are
-    given on the robot's clock. Without ``tcp`` the tracked top edge itself is the gripper.
+    given on the robot's clock; where the hand rests, the lag is taken for 0. Without ``tcp`` the tracked top edge
+    itself is the gripper.
 
-    Takes with names alike are no repeats: they start at other moments, and the paths of the hand differ by centimetres.
+    Takes with names alike are not marked as repeats: the robot did not start them at one moment, nor on one path.
 
     References:
         Luque, Parent, Colomé, Ocampo-Martinez and Torras, *Model predictive control for dynamic cloth manipulation:
         parameter learning and experimental validation* (2022); github.com/Alados5/tfm_matlab.
     """
     files = archives(path, ("mesh", "t"))
-    return [_recording(files[name], name) for name in chosen(takes, list(files), path)]
+    made = []
+    for name in chosen(takes, list(files), path):
+        with about(files[name]):
+            made.append(_recording(files[name], name))
+    return made
 
 
 def _recording(path: Path, name: str) -> Recording:
-    data = arrays(path, ("mesh", "t"))
-    mesh, time = shaped(data["mesh"], (None, None, None, 3), "mesh", path), data["t"]
-    if mesh.shape[1] != mesh.shape[2] or len(time) != len(mesh):
-        raise InputError(f"{path}: mesh must be (T, n, n, 3) with T times t, but is {mesh.shape} with {time.shape}")
+    data = arrays(path, ("mesh", "t"), ("tcp", "tcp_t"))
+    mesh = shaped(data["mesh"], (None, None, None, 3), "mesh", path)
+    time = shaped(data["t"], (len(mesh),), "t", path)
+    if mesh.shape[1] != mesh.shape[2] or mesh.shape[1] < 2:
+        raise InputError(f"{path}: mesh must be (T, n, n, 3) with n from 2 up, but is {mesh.shape}")
     points = mesh[:, :, ::-1].transpose(0, 2, 1, 3).reshape(len(mesh), -1, 3)
     top = points[:, : mesh.shape[1]]
     whole = np.isfinite(top).all(axis=(1, 2))
@@ -55,10 +65,16 @@ def _recording(path: Path, name: str) -> Recording:
         turns = carried_turns(_along(top[whole]), np.array([1.0, 0.0, 0.0]))
         motion = Motion(time[whole], np.concatenate([middle, turns], axis=1)[:, None])
         return Recording(name, PointSeries(time, points), motion)
+    if "tcp_t" not in data:
+        raise InputError(f"{path} has tcp but no tcp_t (K,), the times of its poses [s]; add it, or leave tcp out")
     hand = shaped(data["tcp"], (None, 7), "tcp", path)
-    clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand)
+    clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand, path)
     lag = camera_lag(time[whole], middle, clock, hand[:, :3])
-    note(f"{name}: the camera lags the robot by {lag:.2f} s; points are on the robot's clock")
+    if lag is None:
+        lag = 0.0
+        note(f"{name}: the hand rests, so how much the camera lags does not show; it is taken for 0 s")
+    else:
+        note(f"{name}: the camera lags the robot by {lag:.2f} s; points are on the robot's clock")
     turns = multiply(hand[:, [6, 3, 4, 5]], inverse(HOME))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     then = Motion(clock, np.concatenate([hand[:, :3], turns], axis=1)[:, None]).at(time[whole] - lag)[:, 0]
@@ -67,26 +83,42 @@ def _recording(path: Path, name: str) -> Recording:
     return Recording(name, PointSeries(time - lag, points), Motion(clock, poses[:, None]))
 
 
-def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> float:
+def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> float | None:
     """How much later the camera stamps what the hand does [s]: where their displacements correlate most.
+
+    None where both rest and nothing tells.
 
     Args:
         seen: ``(T,)`` [s], of the camera.
         edge: ``(T, 3)`` [m], what the hand carries.
         clock: ``(K,)`` [s], of the robot.
         hand: ``(K, 3)`` [m].
+
+    Raises:
+        InputError: at no lag that is tried do they move alike, so that hand and cloth are not of one take.
     """
     moved = edge - edge.mean(axis=0)
+    if max(_spread(edge), _spread(hand)) < RESTS:
+        return None
     score = np.empty(len(LAGS))
     for k, lag in enumerate(LAGS):
         then = interpolate(seen - lag, clock, hand)
         then = then - then.mean(axis=0)
         score[k] = np.sum(moved * then) / max(float(np.sqrt(np.sum(moved**2) * np.sum(then**2))), 1e-12)
     best = int(np.argmax(score))
-    if not 0 < best < len(LAGS) - 1:
-        return float(LAGS[best])
+    if not 0 < best < len(LAGS) - 1 or score[best] < ALIKE:
+        raise InputError(
+            f"the cloth does not move as the robot's hand does (correlation {score[best]:.2f} at best, at a lag of "
+            f"{LAGS[best]:.2f} s of {LAGS[0]:.1f} to {LAGS[-1]:.1f} s); check that tcp and tcp_t are of this take, or "
+            "leave them out, and the tracked top edge is the gripper"
+        )
     below, at, above = score[best - 1 : best + 2]
     return float(LAGS[best] + (LAGS[1] - LAGS[0]) * 0.5 * (below - above) / min(below - 2 * at + above, -1e-12))
+
+
+def _spread(path: FloatArray) -> float:
+    """Root mean square distance of ``path (T, 3)`` from its middle [m]."""
+    return float(np.sqrt(np.mean(np.sum((path - path.mean(axis=0)) ** 2, axis=1))))
 
 
 def _along(top: FloatArray) -> FloatArray:
@@ -95,7 +127,11 @@ def _along(top: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("p,tpx->tx", share, top))
 
 
-def _rising(clock: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Without messages that came twice or late."""
+def _rising(clock: FloatArray, poses: FloatArray, path: Path) -> tuple[FloatArray, FloatArray]:
+    """Without messages that came twice or late, or hold no pose."""
+    whole = np.isfinite(clock) & np.isfinite(poses).all(axis=1) & (np.linalg.norm(poses[:, 3:], axis=1) > 0)
+    if whole.sum() < 2:
+        raise InputError(f"{path}: tcp holds {int(whole.sum())} whole poses; at least 2 are needed, or no tcp at all")
+    clock, poses = clock[whole], poses[whole]
     keep = np.concatenate([[True], clock[1:] > np.maximum.accumulate(clock)[:-1]])
     return clock[keep], poses[keep]

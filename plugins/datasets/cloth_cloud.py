@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...core.dataset import archives, arrays, chosen, note, shaped
+from ...core.dataset import about, archives, arrays, chosen, note, shaped
 from ...core.errors import InputError
 from ...core.measurement import Recording
 from ...core.motion import Motion
@@ -25,7 +25,11 @@ def read_cloth_cloud(path: Path, takes: Sequence[str]) -> list[Recording]:
         rendering of deformable objects*, IROS 2022; github.com/priyasundaresan/diffcloud_real2sim.
     """
     files = archives(path, ("points", "gripper_cmd", "t"))
-    return [_recording(files[name], name) for name in chosen(takes, list(files), path)]
+    made = []
+    for name in chosen(takes, list(files), path):
+        with about(files[name]):
+            made.append(_recording(files[name], name))
+    return made
 
 
 def _recording(path: Path, name: str) -> Recording:

@@ -2,11 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
-from ...core.dataset import arrays, chosen, note, shaped
+from ...core.arrays import FloatArray, IntArray
+from ...core.dataset import about, arrays, chosen, note, shaped
 from ...core.errors import InputError, MissingFileError
 from ...core.measurement import Recording
 from ...core.motion import Motion
@@ -25,7 +27,8 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
     where the outer one is, and turns as the pair turns, about no axis but that of the shortest rotation from frame to
     frame (what a marker pair does not show is the turn about itself); the x axis of the first points along the cable,
     that of the second against it. Frames that the motion capture lost are put back on the clock, not in the data;
-    markers that cannot be where they seem to be are NaN.
+    markers that cannot be where they seem to be are NaN. Where the whole cable jumps farther than lost frames
+    explain, it is said and left.
 
     References:
         Chen, Zhang, Brei, Vasudevan and others, *Differentiable discrete elastic rods for real-time modeling of
@@ -35,33 +38,67 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
         raise MissingFileError(f"there is no file {path}; name the .npz file of one cable")
     data = arrays(path, ("markers", "clamped", "fps", "names"))
     markers = shaped(data["markers"], (None, None, None, 3), "markers", path)
-    clamped = np.asarray(shaped(data["clamped"], (4,), "clamped", path), np.int64) % markers.shape[2]
-    if len(set(clamped.tolist())) < 4 or markers.shape[1] < 2:
-        raise InputError(f"{path}: it needs at least 2 frames and 4 different clamped markers, but has {clamped}")
-    names = [str(n).rsplit(".", 1)[0] for n in data["names"]]
-    step = 1.0 / float(data["fps"])
-    return [_recording(markers[names.index(n)], clamped, step, n) for n in chosen(takes, names, path)]
+    clamped = _clamped(shaped(data["clamped"], (4,), "clamped", path), markers.shape[2], path)
+    fps = float(shaped(data["fps"], (), "fps", path))
+    if not 0 < fps < np.inf:
+        raise InputError(f"{path}: fps must be above zero, but is {fps:g}; it is the number of frames a second")
+    names = _names(data["names"], len(markers), path)
+    with about(path):
+        return [_recording(markers[names.index(n)], clamped, 1.0 / fps, n) for n in chosen(takes, names, path)]
+
+
+def _clamped(given: FloatArray, count: int, path: Path) -> IntArray:
+    """Numbers of the clamped markers from 0, of which the file counts some from the end."""
+    if not np.isin(given, np.arange(-count, count)).all() or len(set(np.mod(given, count))) < 4:
+        told = ", ".join(f"{g:g}" for g in given)
+        raise InputError(
+            f"{path}: clamped must name 4 different markers of {count} (from 0, or from -1 at the end), but is {told}"
+        )
+    return np.mod(given, count).astype(np.int64)
+
+
+def _names(given: npt.NDArray[Any], takes: int, path: Path) -> list[str]:
+    """Names of the takes, without a suffix as of ``12.pkl``."""
+    if given.shape != (takes,) or given.dtype.kind not in "US":
+        raise InputError(
+            f"{path}: names must be one text for each of the {takes} takes of markers, but is of shape {given.shape} "
+            f"and {given.dtype}"
+        )
+    names = [str(n).rsplit(".", 1)[0] for n in given.astype(str)]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise InputError(f"{path}: names must differ, but {', '.join(twice)} is there more than once")
+    return names
 
 
 def _recording(markers: FloatArray, clamped: IntArray, step: float, name: str) -> Recording:
-    missing = lost_frames(markers)
+    markers = np.where(np.isfinite(markers), markers, np.nan)
+    missing, jumped = lost_frames(markers)
     wrong = wrong_markers(markers)
     time: FloatArray = step * (np.arange(len(markers)) + np.cumsum(missing)).astype(np.float64)
     if missing.any():
         note(f"{name}: {int(missing.sum())} lost frames put back on the clock, at {_times(time[missing > 0])}")
+    if jumped.any():
+        note(f"{name}: the whole cable jumps at {_times(time[jumped])}, which no lost frames explain; left as it is")
     if wrong.any():
         told = _times(time[wrong.any(axis=1)])
         note(f"{name}: {int(wrong.sum())} markers left out in {int(wrong.any(axis=1).sum())} frames, at {told}")
     points = np.where(wrong[..., None], np.nan, markers)
-    return Recording(name, PointSeries(time, points), _grippers(time, markers, wrong, clamped))
+    return Recording(name, PointSeries(time, points), _grippers(time, points, clamped, name))
 
 
-def _grippers(time: FloatArray, markers: FloatArray, wrong: BoolArray, clamped: IntArray) -> Motion:
-    """Poses of both ends where all four clamped markers are right."""
-    good = ~wrong[:, clamped].any(axis=1)
-    first, second, third, last = (markers[good, c] for c in clamped)
+def _grippers(time: FloatArray, points: FloatArray, clamped: IntArray, name: str) -> Motion:
+    """Poses of both ends where all four clamped markers are seen, and those of a pair apart."""
+    first, second, third, last = (points[:, c] for c in clamped)
+    apart = np.stack([np.linalg.norm(second - first, axis=1), np.linalg.norm(third - last, axis=1)])
+    good = (apart > 0).all(axis=0)  # a comparison with NaN is false
+    if not good.any():
+        raise InputError(
+            f"take {name!r}: in no frame are all four clamped markers ({', '.join(map(str, clamped))}) where they can "
+            "be, so there is no path of the grippers; leave it out"
+        )
     ends = []
-    for outer, inner in ((first, second), (last, third)):
+    for outer, inner in ((first[good], second[good]), (last[good], third[good])):
         ends.append(np.concatenate([outer, carried_turns(inner - outer, _ALONG)], axis=1))
     return Motion(time[good], np.stack(ends, axis=1))
 

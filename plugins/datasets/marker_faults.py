@@ -1,5 +1,7 @@
 """Faults of motion capture along a cable: frames that were lost, and markers that were taken for one another."""
 
+import warnings
+
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
@@ -9,6 +11,11 @@ LOST_STEP = 0.001
 #: ... and more than this many times as far as in the frames before and after [1]. In the 168 published takes 0.99 of
 #: all steps are less than 0.3 mm above those beside them; the few beyond 1 mm are mostly 2, some up to 13 times as far.
 LOST_RATIO = 1.5
+#: Below this step [m] how many frames were lost cannot be told, as nothing moves. In the published takes it is 1.2 mm
+#: at least where frames were lost.
+LOST_FLOOR = 0.0005
+#: More frames than this are not lost but a jump: the cable was somewhere else [1]. In the published takes it is 19.
+MOST_LOST = 25
 #: A distance between neighbours is wrong if it is this far from its own median [m] ...
 WRONG_DISTANCE = 0.018
 #: ... and this many of its robust standard deviations [1]. The chord of a bent cable is shorter, by 16 mm at most in
@@ -21,26 +28,31 @@ REACH = 3
 JUMP = 0.02
 
 
-def lost_frames(markers: FloatArray) -> IntArray:
-    """How many frames are missing before every frame ``(T,)``, mostly 0.
+def lost_frames(markers: FloatArray) -> tuple[IntArray, BoolArray]:
+    """How many frames are missing before every frame ``(T,)``, mostly 0, and whether it was a jump instead ``(T,)``.
 
     Motion capture that drops frames stores the next one as if nothing had happened: for one frame all markers go
-    several times as far as before and after. How many times is the number of frames that passed.
+    several times as far as before and after. How many times is the number of frames that passed. A cable that hardly
+    moves and then is elsewhere has jumped: no clock explains that.
 
     Args:
-        markers: ``(T, P, 3)`` [m], frame after frame.
+        markers: ``(T, P, 3)`` [m], frame after frame, NaN where one was not seen.
     """
-    missing = np.zeros(len(markers), np.int64)
+    missing, jumped = np.zeros(len(markers), np.int64), np.zeros(len(markers), bool)
     if len(markers) < 4:
-        return missing
+        return missing, jumped
     steps = np.diff(markers, axis=0)
-    far = np.median(np.linalg.norm(steps, axis=2), axis=1)  # of most markers: a few may be wrong
-    usual = np.median(np.linalg.norm(0.5 * (steps[:-2] + steps[2:]), axis=2), axis=1)
+    far = _median(np.linalg.norm(steps, axis=2), axis=1)  # of most markers: a few may be wrong
+    usual = _median(np.linalg.norm(0.5 * (steps[:-2] + steps[2:]), axis=2), axis=1)
     beside = np.maximum(far[:-2], far[2:])
     middle = far[1:-1]
-    lost = (middle > beside + LOST_STEP) & (middle > LOST_RATIO * beside)
-    missing[2:-1] = np.where(lost, np.maximum(np.rint(middle / np.maximum(usual, 1e-9)) - 1, 0), 0)
-    return missing
+    far_out = (middle > beside + LOST_STEP) & (middle > LOST_RATIO * beside) & np.isfinite(usual)
+    count = np.rint(middle[far_out] / np.maximum(usual[far_out], 1e-12)) - 1
+    possible = (usual[far_out] >= LOST_FLOOR) & (count <= MOST_LOST)
+    at = 2 + np.flatnonzero(far_out)
+    missing[at[possible]] = np.maximum(count[possible], 0)
+    jumped[at[~possible]] = True
+    return missing, jumped
 
 
 def wrong_markers(markers: FloatArray) -> BoolArray:
@@ -50,14 +62,14 @@ def wrong_markers(markers: FloatArray) -> BoolArray:
     wrong distances: the one with most of them first. Also any marker that jumps by itself for one frame.
 
     Args:
-        markers: ``(T, P, 3)`` [m] in their order along the cable.
+        markers: ``(T, P, 3)`` [m] in their order along the cable, NaN where one was not seen.
     """
     frames, count = markers.shape[:2]
     bad = np.zeros((frames, count, count), bool)
     for gap in range(1, min(REACH, count - 1) + 1):
         apart = np.linalg.norm(markers[:, gap:] - markers[:, :-gap], axis=2)
-        off = np.abs(apart - np.median(apart, axis=0))
-        spread = 1.4826 * np.median(off, axis=0)
+        off = np.abs(apart - _median(apart, axis=0))
+        spread = 1.4826 * _median(off, axis=0)
         first = np.arange(count - gap)
         bad[:, first, first + gap] = off > np.maximum(WRONG_DISTANCE, WRONG_DEVIATIONS * spread)
     bad |= bad.transpose(0, 2, 1)
@@ -69,8 +81,15 @@ def wrong_markers(markers: FloatArray) -> BoolArray:
             wrong[t, worst] = True
             bad[t, worst] = bad[t, :, worst] = False
     steps = np.diff(markers, axis=0)
-    alone = steps - np.median(steps, axis=1, keepdims=True)
+    alone = steps - _median(steps, axis=1)[:, None]
     there, back = alone[:-1], alone[1:]
     far = np.minimum(np.linalg.norm(there, axis=2), np.linalg.norm(back, axis=2)) > JUMP
     wrong[1:-1] |= far & (np.sum(there * back, axis=2) < 0)
     return wrong
+
+
+def _median(values: FloatArray, axis: int) -> FloatArray:
+    """Of what was seen; NaN where nothing was."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
+        return np.asarray(np.nanmedian(values, axis=axis))

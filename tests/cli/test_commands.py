@@ -131,6 +131,10 @@ def test_add_writes_a_study_with_the_effect(study: Path, capsys: pytest.CaptureF
     assert status("add", "air-drag", str(study), "-o", str(second)) == 2
     assert status("add", "air-drag", str(study), "-o", str(second), "--force") == 0
     assert status("add", "air-drag", str(second)) == 2
+    capsys.readouterr()
+    assert status("add", "law", str(study)) == 2  # no candidate
+    assert f"then muslin add --law law.json {study}" in capsys.readouterr().err
+    assert not study.with_name("study-with-law.toml").exists()
 
 
 def test_import_of_several_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,15 +1,13 @@
-import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from published import published
 
 from muslin.core.errors import InputError
 from muslin.core.importing import ImportOptions, import_file
 
 ezc3d = pytest.importorskip("ezc3d", reason="C3D needs ezc3d: pip install 'muslin[mocap]'")
-
-BEAM = Path(os.environ.get("MUSLIN_DATA", "data")) / "beam"
 
 
 def write_c3d(path: Path, points: np.ndarray, unit: str = "mm", rate: float = 50.0) -> Path:
@@ -74,9 +72,8 @@ def test_damage_that_takes_the_library_down_is_told(tmp_path: Path) -> None:
     assert told >= 8
 
 
-@pytest.mark.skipif(not BEAM.is_dir(), reason=f"the beam recordings are not at {BEAM}; set MUSLIN_DATA")
 def test_the_beam_recordings_agree_with_their_conversion() -> None:
-    files = sorted(BEAM.glob("*.c3d"))
+    files = sorted(published("beam").glob("*.c3d"))
     assert len(files) == 6
     for file in files:
         [r] = import_file(file, ImportOptions(up="x"))

@@ -49,3 +49,12 @@ def test_time_going_backwards_says_where() -> None:
 def test_shapes_that_cannot_be() -> None:
     with pytest.raises(InputError, match=r"poses \(K, G, 7\)"):
         Motion(np.zeros(2), np.zeros((2, 1, 3)))
+
+
+def test_a_pose_that_is_not_known_says_which() -> None:
+    poses = np.tile(Motion.still().poses, (3, 2, 1))
+    poses[1, 1, 4] = np.nan
+    with pytest.raises(InputError, match=r"the pose of gripper 1 at time\[1\] = 0.5 s is not a finite number"):
+        Motion(np.array([0.0, 0.5, 1.0]), poses)
+    with pytest.raises(InputError, match=r"gripper 0 at time\[0\] = nan s"):
+        Motion(np.array([np.nan]), np.zeros((1, 1, 7)))

@@ -1,6 +1,5 @@
 """Readers of published sets: what they promise, on small files made here, and on the real ones where there are any."""
 
-import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,16 +7,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from published import ROOT, published
 
 from muslin.core.dataset import DatasetNote, cropped
 from muslin.core.errors import InputError, MissingFileError
 from muslin.core.measurement import Recording
 from muslin.core.motion import rotate
 from muslin.core.registry import REGISTRY
+from muslin.core.testing import check_dataset
 
-ROOT = Path(__file__).resolve().parents[2]
 DROPS = ROOT / "examples/balls/drops.csv"
-DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "data"))
 FOLDERS = {"deform-cable": "cable", "carried-cloth": "cloth_carried", "cloth-cloud": "cloth_cloud"}
 
 
@@ -30,10 +29,7 @@ def read(name: str, path: Path, *takes: str) -> tuple[list[Recording], list[str]
 
 
 def real(name: str) -> Path:
-    path = DATA / FOLDERS[name]
-    if not path.exists():
-        pytest.skip(f"the recordings of {name} are not here; set MUSLIN_DATA to their folder")
-    return path
+    return published(FOLDERS[name])
 
 
 def swinging_cable(frames: int = 60, markers: int = 8) -> np.ndarray[Any, Any]:
@@ -50,6 +46,20 @@ def save_cable(path: Path, markers: np.ndarray[Any, Any], names: Sequence[str] =
     arrays = {"markers": markers, "clamped": np.array([0, 1, -2, -1]), "fps": 100.0, "names": np.array(names)}
     np.savez(path, **{**arrays, **other})
     return path
+
+
+@pytest.mark.parametrize("name", REGISTRY.names("dataset"))
+def test_every_installed_reader_conforms(name: str, tmp_path: Path) -> None:
+    check_dataset(REGISTRY.get("dataset", name))
+    if name == "balls":
+        check_dataset(REGISTRY.get("dataset", name), DROPS)
+    if name == "deform-cable":
+        path = save_cable(tmp_path / "cable.npz", np.stack([swinging_cable()] * 2), ("a.pkl", "b.pkl"))
+        check_dataset(REGISTRY.get("dataset", name), path)
+    if name == "carried-cloth":
+        for k in range(2):
+            np.savez(tmp_path / f"take{k}.npz", **carried(0.1 * k, (0.0, 0.0, 0.0)))
+        check_dataset(REGISTRY.get("dataset", name), tmp_path)
 
 
 def test_heights_alone_are_heights_and_fall() -> None:

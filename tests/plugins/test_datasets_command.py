@@ -21,6 +21,7 @@ def test_takes_become_recordings_and_what_was_left_out_is_said(tmp_path: Path) -
     done = run(tmp_path, str(DROPS), "--dataset", "balls", *takes, "--stop", "2", "-o", "out.zarr")
     assert done.returncode == 0, done.stderr
     assert "golf-ball-2: left out 1 of 44 frames" in done.stdout and " m (z)" in done.stdout
+    assert "--scenario NAME " in done.stdout and "scenarios: fling" in done.stdout  # none is guessed
     made = load_measurement(tmp_path / "out.zarr")
     assert made.names == ["golf-ball-2", "tennis-ball-1"]
     for recording in made.recordings:
@@ -39,8 +40,16 @@ def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path) -> None:
         (["--dataset", "balls", "--take", "golf"], "has no take 'golf'; it has baseball-1"),
         (["--dataset", "balls", "--up", "y"], "--up does not go with --dataset"),
         (["--take", "golf-ball-1"], "say which set with --dataset"),
-        (["--dataset", "balls", "--start", "1", "--start", "2"], "--start is given 2 times for 22 takes"),
+        (
+            ["--dataset", "balls", "--start", "1", "--start", "2"],
+            "2 times for 22 takes; give it once, or once a take",
+        ),
     ):
         done = run(tmp_path, str(DROPS), *arguments, "-o", "out.zarr")
         assert done.returncode == 2 and said in done.stderr, done.stderr
         assert "Traceback" not in done.stderr and not (tmp_path / "out.zarr").exists()
+
+
+def test_the_help_of_import_tells_of_sets(tmp_path: Path) -> None:
+    told = " ".join(run(tmp_path, "--help").stdout.replace("│", " ").split())
+    assert "with --dataset the one file or folder of that set" in told and "FILE" in told
