@@ -74,6 +74,16 @@ class Measurement:
         raise InputError(f"no recording {name!r} in this measurement; it has {', '.join(self.names)}")
 
 
+def check_spatial(recording: Recording) -> None:
+    """Raise :class:`InputError` unless the points are x, y and z in metres, as simulated ones are."""
+    if recording.series.unit == "px":
+        raise InputError(
+            f"recording {recording.name!r} is in pixels; only points in metres can be compared without a camera"
+        )
+    if recording.series.points.shape[2] != 3:
+        raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
+
+
 def repeats(recordings: Iterable[Recording]) -> list[tuple[Recording, Recording]]:
     """Pairs of takes of the same motion under the same load, with the same corresponding points."""
     takes = [r for r in recordings if r.series.correspondence]

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..body import rope_line
 from ..errors import InputError
-from ..measurement import Recording
+from ..measurement import Recording, check_spatial
 from ..motion import inverse, rotate
 from ..scenario import Scenario
 from .starts import GivenShape
@@ -20,11 +20,14 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     """The scenario of a rope whose markers, in their order along it, reach from its first vertex to its last.
 
     At rest it is straight and as long as the curve through the markers of the first frame (a natural cubic spline over
-    the chords), along which every marker keeps its place.
+    the chords), along which every marker keeps its place. Length and so mass (at one linear density) are therefore
+    those of this take: takes of one cable differ by as much as their markers are off. It is not given time to settle,
+    which would take it away from where it was seen.
 
     Raises:
-        InputError: not a rope, or a marker is not seen in the first frame.
+        InputError: not a rope, not x, y and z in metres, or a marker is not seen in the first frame.
     """
+    check_spatial(recording)
     if scenario.body.kind != "rope" or not recording.series.correspondence:
         raise InputError(f"recording {recording.name!r}: only a rope with markers in order starts as measured")
     points = recording.series.points[0]
@@ -44,7 +47,8 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     markers[np.arange(len(points)), left + 1] = share - left
     evenly = np.linspace(0.0, along[-1], len(along))
     local = np.stack([np.interp(evenly, along, local[:, k]) for k in range(3)], axis=1)
-    return replace(scenario, body=body, start=GivenShape(local, along[-1], np.zeros(3)), markers=markers)
+    start = GivenShape(local, along[-1], np.zeros(3))
+    return replace(scenario, body=body, start=start, markers=markers, settle=0.0)
 
 
 def _curve(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,26 +1,16 @@
 """The study file: one TOML table a topic, every key checked."""
 
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
-import numpy as np
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..errors import InputError, MissingFileError
-from ..importing.mesh import read_closed_surface
-from ..obstacles import Cylinder, StaticMesh, Table
 from ..registry import nearest
 from ..store import write_text
-
-#: x, y, z [m].
-Point = tuple[float, float, float]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+from .scenario_table import OBSTACLES, ScenarioTable, StrictTable
 
 
 class _OpenTable(BaseModel):
@@ -34,7 +24,7 @@ class _OpenTable(BaseModel):
         return dict(self.model_extra or {})
 
 
-class StudyTable(_Table):
+class StudyTable(StrictTable):
     """``[study]``: what is fitted on what; a simulation that takes longer than ``time_limit`` [s] has failed."""
 
     measurement: str
@@ -43,109 +33,6 @@ class StudyTable(_Table):
     results: str | None = None
     seed: int = Field(default=0, ge=0)
     time_limit: float = Field(default=120.0, gt=0)
-
-
-class TableTable(_Table):
-    """An obstacle ``{ kind = "table", ... }``: see :class:`~muslin.core.obstacles.Table`."""
-
-    kind: Literal["table"]
-    height: float
-    friction: float = Field(default=1.0, ge=0)
-
-    def build(self, folder: Path) -> Table:
-        return Table(self.height, self.friction)
-
-
-class CylinderTable(_Table):
-    """An obstacle ``{ kind = "cylinder", ... }``: see :class:`~muslin.core.obstacles.Cylinder`."""
-
-    kind: Literal["cylinder"]
-    center: Point
-    axis: Point
-    radius: float = Field(gt=0)
-    length: float = Field(gt=0)
-    friction: float = Field(default=1.0, ge=0)
-
-    def build(self, folder: Path) -> Cylinder:
-        return Cylinder(np.array(self.center), np.array(self.axis), self.radius, self.length, self.friction)
-
-
-class MeshTable(_Table):
-    """An obstacle ``{ kind = "mesh", ... }``: see :class:`~muslin.core.obstacles.StaticMesh`."""
-
-    kind: Literal["mesh"]
-    file: str
-    scale: float = Field(default=1.0, gt=0)
-    up: Literal["x", "y", "z"] = "z"
-    position: Point = (0.0, 0.0, 0.0)
-    friction: float = Field(default=1.0, ge=0)
-
-    def build(self, folder: Path) -> StaticMesh:
-        vertices, triangles = read_closed_surface(folder / self.file, self.scale, self.up)
-        return StaticMesh(vertices + np.array(self.position), triangles, self.friction)
-
-
-_OBSTACLES = ("table", "cylinder", "mesh")
-ObstacleTable = Annotated[TableTable | CylinderTable | MeshTable, Field(discriminator="kind")]
-
-
-class ScenarioTable(_Table):
-    """``[scenario]``: the object and how it is held; every key but the name overrides a built-in.
-
-    ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says
-    in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
-    first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
-    as it stands in the world at the start. ``start = "measured"`` lets a rope start through the markers of the first
-    frame, and says where they are on it.
-    """
-
-    name: str
-    size: list[float] | None = None
-    vertices: list[int] | None = None
-    mesh: str | None = None
-    mesh_scale: float = Field(default=1.0, gt=0)
-    mesh_up: Literal["x", "y", "z"] = "z"
-    straight_rest: bool = False
-    frame: Literal["gripper", "upright", "world"] = "gripper"
-    grasps: list[list[int]] | None = None
-    grasp_points: list[Point | list[Point]] | None = None
-    grasp_radius: float = Field(default=0.0, ge=0)
-    start: Literal["measured"] | None = None
-    markers: list[int] | Literal["all", "bound"] | None = None
-    points: list[int] | None = None
-    settle: float | None = Field(default=None, ge=0)
-    obstacles: list[ObstacleTable] | None = None
-
-    @property
-    def files(self) -> list[str]:
-        """The meshes that it names, as they are written."""
-        meshes = [o.file for o in self.obstacles or [] if isinstance(o, MeshTable)]
-        return [*([self.mesh] if self.mesh is not None else []), *meshes]
-
-    def move_files(self, to: Callable[[str], str]) -> None:
-        """Name every mesh anew."""
-        if self.mesh is not None:
-            self.mesh = to(self.mesh)
-        for obstacle in self.obstacles or []:
-            if isinstance(obstacle, MeshTable):
-                obstacle.file = to(obstacle.file)
-
-    @model_validator(mode="after")
-    def _one_object(self) -> "ScenarioTable":
-        if self.mesh is None:
-            for key in ("mesh_scale", "mesh_up", "straight_rest"):
-                if key in self.model_fields_set:
-                    raise ValueError(f"{key} says how to take a mesh, but there is none; add mesh = 'FILE'")
-        elif self.size is not None:
-            raise ValueError("size does not go with a mesh, which has one of its own; use mesh_scale")
-        if self.grasps is not None and self.grasp_points is not None:
-            raise ValueError("grasps and grasp_points both say what is held; keep one of them")
-        if self.start is not None and (self.mesh is not None or self.markers is not None):
-            other = "mesh" if self.mesh is not None else "markers"
-            raise ValueError(f"start = 'measured' finds the rope and its markers itself; leave {other} out")
-        if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
-            raise ValueError("grasp_radius goes with grasp_points, which are missing")
-        return self
 
 
 class EstimatorTable(_OpenTable):
@@ -167,7 +54,7 @@ class EstimatorTable(_OpenTable):
         return self.proposal or ("gaussian" if self.options.get("preset") == "paper" else "truncated")
 
 
-class ParameterTable(_Table):
+class ParameterTable(StrictTable):
     """``[parameters.NAME]``: bounds of a uniform prior."""
 
     low: float
@@ -176,20 +63,20 @@ class ParameterTable(_Table):
     unit: str | None = None
 
 
-class NoiseTable(_Table):
+class NoiseTable(StrictTable):
     """``[noise]``: standard deviation of the measurement, if it is known."""
 
     sd: float | None = Field(default=None, gt=0)
 
 
-class NuisanceTable(_Table):
+class NuisanceTable(StrictTable):
     """``[nuisance]``: prior standard deviations of what may be off in the measurement itself."""
 
     clock_offset: float = Field(default=0.0, ge=0)
     constant_offset: float = Field(default=0.0, ge=0)
 
 
-class DiagnoseTable(_Table):
+class DiagnoseTable(StrictTable):
     """``[diagnose]``: which effects to try, from how many points each at most, with how many simulations in all."""
 
     candidates: list[str] | None = None
@@ -197,7 +84,7 @@ class DiagnoseTable(_Table):
     simulations: int = Field(default=1000, ge=100)
 
 
-class StudyConfig(_Table):
+class StudyConfig(StrictTable):
     """A whole study file."""
 
     study: StudyTable
@@ -223,6 +110,15 @@ class StudyConfig(_Table):
             raise ValueError(f"recording {', '.join(both)} is both fitted on and held out")
         return self
 
+    @model_validator(mode="after")
+    def _length_is_measured(self) -> "StudyConfig":
+        if self.scenario.start == "measured" and "scale" in self.parameters:
+            raise ValueError(
+                "parameters.scale does not go with start = 'measured', which takes the length of the rope from "
+                "each take; leave it out"
+            )
+        return self
+
 
 def parse_config(table: dict[str, Any], where: str) -> StudyConfig:
     """Check a table that came from ``where`` (a file name, for messages)."""
@@ -242,7 +138,7 @@ def parse_config(table: dict[str, Any], where: str) -> StudyConfig:
             elif e["type"] == "missing":
                 lines.append(f"[{place}] is missing")
             elif e["type"].startswith("union_tag"):
-                tag, kinds = str(e.get("ctx", {}).get("tag", "")), list(_OBSTACLES)
+                tag, kinds = str(e.get("ctx", {}).get("tag", "")), list(OBSTACLES)
                 what = f"there is no obstacle of kind {tag!r}.{nearest(tag, kinds)}" if tag else "kind is missing."
                 lines.append(f"[{place}] {what} Kinds: {', '.join(kinds)}")
             elif e["type"] in ("list_type", "tuple_type"):

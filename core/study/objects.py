@@ -9,7 +9,7 @@ from ..arrays import FloatArray, IntArray
 from ..body import Body, rope_line
 from ..errors import InputError
 from ..importing.mesh import read_body
-from ..measurement import Recording
+from ..measurement import Recording, check_spatial
 from ..motion import IDENTITY_POSE, Motion, inverse, rotate
 from ..obstacles import Obstacle
 from ..scenario import Scenario, StartShape, bound_markers, marker_weights
@@ -17,7 +17,7 @@ from ..scenarios import preset
 from ..scenarios.grasps import ASK, grasps_at
 from ..scenarios.measured import measured_start
 from ..scenarios.starts import GivenShape
-from .config import ScenarioTable
+from .scenario_table import ScenarioTable
 
 #: An edge that is longer at the start than this times its rest length cannot be meant.
 _LARGEST_START_STRETCH = 1.05
@@ -74,6 +74,7 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path) -> 
         start=start,
         settle=base.settle if table.settle is None else table.settle,
     ).for_recording(recording)
+    check_spatial(recording)
     if table.start == "measured":
         return measured_start(plain, recording)
     return replace(plain, markers=_markers(table.markers, plain, recording))
@@ -130,12 +131,6 @@ def check_unstretched(scenario: Scenario, scale: float, where: str) -> None:
 
 def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Recording) -> FloatArray:
     count, points = len(scenario.body.vertices), recording.series.points
-    if recording.series.unit == "px":
-        raise InputError(
-            f"recording {recording.name!r} is in pixels; only points in metres can be compared without a camera"
-        )
-    if points.shape[2] != 3:
-        raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
     if choice == "bound":
         if scenario.settle > 0:
             raise InputError(

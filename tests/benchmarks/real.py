@@ -61,7 +61,7 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
         "rollouts": int(fit.simulations) + int(found["simulations"]),
         "seconds": round(seconds, 1),
         "estimate": fit.values(),
-        "told": found["told"] if isinstance(found.get("told"), str) else None,
+        "told": found["told"],
         "candidates": [
             {k: c[k] for k in ("name", "coefficients", "explained", "z", "objection", "held_out_after")}
             for c in found["candidates"][:5]
@@ -75,14 +75,30 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
         named = [m for m in models if found["effects"] and m["effects"] in (found["effects"], found["effects"][:1])]
         if named:
             row["after open loop"] = absolute(study, named[0]["values"], named[0]["effects"])
-    return row
+    return row | {"machine": machine(), "versions": versions()}
 
 
 def rms(errors: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-def markdown(rows: list[dict[str, Any]], skipped: list[str]) -> str:
+def joined(
+    old: Mapping[str, Any], rows: list[dict[str, Any]], skipped: Mapping[str, str]
+) -> tuple[list[dict[str, Any]], dict[str, str]]:
+    """Rows and skipped sets of this run beside those of ``old``, the content of an earlier ``real.json``.
+
+    Every row keeps the machine and the versions that it was made with. A set that was skipped now keeps its row.
+    """
+    made = {r["set"]: r for r in rows}
+    for row in old.get("rows", []):
+        labels = {key: row.get(key, old.get(key)) for key in ("machine", "versions")}
+        made.setdefault(row["set"], row | labels)
+    left = {name: why for name, why in {**old.get("skipped", {}), **skipped}.items() if name not in made}
+    place = {c.name: k for k, c in enumerate(CASES)}
+    return sorted(made.values(), key=lambda r: place.get(r["set"], len(place))), left
+
+
+def markdown(rows: list[dict[str, Any]], skipped: Mapping[str, str]) -> str:
     lines = ["| " + " | ".join(TITLES) + " |", "|" + "---|" * len(TITLES)]
     for r in rows:
         lengths = ["–" if r[c] is None else f"{1e3 * r[c]:.4g}" for c in COLUMNS]
@@ -96,7 +112,7 @@ def markdown(rows: list[dict[str, Any]], skipped: list[str]) -> str:
                     f"- {r['set']}, {state}, open loop: median point error {1e3 * e['median_point']:.1f} mm, mean "
                     f"absolute coordinate error {1e3 * e['mean_coordinate']:.1f} mm"
                 )
-    lines += [f"- skipped: {s}" for s in skipped]
+    lines += [f"- skipped: {name}: {why}" for name, why in skipped.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -105,27 +121,27 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=None)
     parser.add_argument("--only", nargs="*", help=f"of {', '.join(c.name for c in CASES)}; the others keep their rows")
     told = parser.parse_args()
-    rows, skipped = [], []
+    rows: list[dict[str, Any]] = []
+    skipped: dict[str, str] = {}
     for case in CASES:
         if told.only is not None and case.name not in told.only:
             continue
         if not case.needs.exists():
-            skipped.append(f"{case.name}: there is no {case.needs.name} where MUSLIN_DATA points")
-            print(f"skipped {skipped[-1]}", flush=True)
+            skipped[case.name] = f"there is no {case.needs.name} where MUSLIN_DATA points"
+            print(f"skipped {case.name}: {skipped[case.name]}", flush=True)
             continue
         with tempfile.TemporaryDirectory() as folder:
             row = row_of(case, case.make(Path(folder), told.workers))
         rows.append(row)
         print(f"{case.name}: {row['verdict']}, {row['seconds']:.0f} s", flush=True)
     path = RESULTS / "real.json"
-    if told.only is not None and path.exists():
-        rows += [r for r in json.loads(path.read_text())["rows"] if r["set"] not in [n["set"] for n in rows]]
-    order = [c.name for c in CASES]
-    rows.sort(key=lambda r: order.index(r["set"]))
+    old = json.loads(path.read_text(encoding="utf-8")) if told.only is not None and path.exists() else {}
+    old["skipped"] = old.get("skipped") or {}
+    rows, skipped = joined(old, rows, skipped)
     text = markdown(rows, skipped)
     print("\n" + text)
-    content = {"machine": machine(), "versions": versions(), "rows": rows, "skipped": skipped}
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    content = json.dumps({"rows": rows, "skipped": skipped}, indent=1, ensure_ascii=False)
+    path.write_text(content + "\n", encoding="utf-8")
     path.with_suffix(".md").write_text(text, encoding="utf-8")
     print(f"wrote {path} and real.md")
 

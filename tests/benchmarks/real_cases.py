@@ -1,8 +1,8 @@
 """The real recordings of the benchmark: how each set becomes a study."""
 
-import os
 import runpy
 import shutil
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,9 +16,10 @@ from muslin.core.measurement_store import save_measurement
 from muslin.core.registry import REGISTRY
 from muslin.core.study import Study, read_config, write_config
 
-ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(Path(__file__).parents[1]))  # for when it is run as a script
+from published import DATA, ROOT
+
 EXAMPLES = ROOT / "examples"
-DATA = Path(os.environ.get("MUSLIN_DATA", ROOT / "data"))
 
 #: Takes of a cable, fitted on and held out: those that start slowest, alternately, all of their 5 s.
 CABLE_TAKES = (3, 2)

@@ -1,6 +1,7 @@
 """Ropes that start as they were measured."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,6 +41,23 @@ def test_it_goes_through_the_markers_and_is_as_long_as_the_curve() -> None:
     np.testing.assert_allclose(links, made.body.measures, rtol=1e-3)  # neither stretched nor slack
     assert made.body.measures.sum() == pytest.approx(0.4 * 2.4, rel=2e-3)
     np.testing.assert_allclose(made.markers.sum(axis=1), 1.0)
+
+
+def test_it_is_there_at_the_first_frame_and_not_settled_before() -> None:
+    scenario, recording = recorded(arc(np.linspace(-1.0, 1.0, 9)))
+    assert scenario.settle > 0  # of the built-in cable
+    assert measured_start(scenario, recording).settle == 0.0
+
+
+def test_it_is_for_points_in_space() -> None:
+    scenario, recording = recorded(arc(np.linspace(-1.0, 1.0, 9)))
+    series = recording.series
+    pixels = replace(recording, series=PointSeries(series.time, series.points[..., :2], "px"))
+    with pytest.raises(InputError, match="recording 'take' is in pixels; only points in metres"):
+        measured_start(scenario, pixels)
+    flat = replace(recording, series=PointSeries(series.time, series.points[..., :2]))
+    with pytest.raises(InputError, match=r"recording 'take' has points \(x, y\) in metres"):
+        measured_start(scenario, flat)
 
 
 def test_it_survives_refinement_and_pickling() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from muslin.core.errors import MuslinError
+from muslin.core.errors import InputError, MuslinError
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
@@ -97,6 +97,20 @@ def test_what_does_not_go_together(folder: Path) -> None:
     assert "holds a rope, but sheet.obj is a cloth" in complaint(folder, name="cable", mesh="sheet.obj")
 
 
+def test_a_measured_start_takes_nothing_that_it_would_ignore(folder: Path) -> None:
+    def refused(**table: Any) -> str:
+        return complaint(folder, name="cable", start="measured", **table)
+
+    told = refused(size=[1.05], markers="all", frame="world")
+    assert "[scenario] start = 'measured' takes the rope, its length and its markers" in told
+    assert "leave size, markers, frame out" in told
+    assert "leave mesh out" in refused(mesh="rope.csv")
+    assert "settle = 0.5 s would take it away from there; leave settle out" in refused(settle=0.5)
+    assert "name the held vertices with grasps" in refused(grasp_points=[[0, 0, 0]])
+    assert "parameters.scale does not go with" in refused(parameters={"scale": {"low": 0.9, "high": 1.1}})
+    assert "only a rope" in complaint(folder, name="fling", start="measured", settle=0.0)
+
+
 def test_a_rope_from_a_file(folder: Path) -> None:
     curved = built(folder, 9, name="swing", mesh="rope.csv", vertices=[9]).scenarios["a"]
     np.testing.assert_allclose(curved.start_vertices()[-1], [0.1, 0, 0.7])
@@ -183,6 +197,22 @@ def test_without_a_built_in_obstacle(folder: Path) -> None:
     assert built(folder, 9, name="wiping", vertices=[3, 3]).scenarios["a"].obstacles == (Table(0.0),)
     assert not built(folder, 9, name="wiping", vertices=[3, 3], obstacles=[]).scenarios["a"].obstacles
     assert "needs a cylinder" in complaint(folder, 9, name="winding", vertices=[9], obstacles=[])
+
+
+def test_an_effect_that_is_no_candidate_is_added_with_its_coefficients_alone(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wide = type("Wide", (REGISTRY.get("effect", "wind"),), {"name": "wide", "candidate": False})
+    monkeypatch.setitem(REGISTRY._objects, ("effect", "wide"), wide)
+    save_measurement(measured(5), folder / "m.zarr")
+    scenario = {"name": "swing", "mesh": "sheet.obj", "grasps": [[0]]}
+    table = {"study": {"measurement": "m.zarr"}, "scenario": scenario, "simulator": {"name": "reference"}}
+    study = Study(parse_config(table, "s"), folder / "study.toml")
+    with pytest.raises(InputError, match=r"'wide' must be told which of its coefficients to infer"):
+        study.add("wide")
+    assert not list(folder.glob("*.toml"))
+    added = study.add("wide", coefficients={"velocity_x": 0.0})
+    assert "wide.velocity_y" in added.problem.space.names and "wide.velocity_x" not in added.problem.space.names
 
 
 def test_paths_start_at_the_study_file_and_results_at_the_content(

@@ -9,7 +9,8 @@ import numpy as np
 from muslin.core.arrays import FloatArray
 from muslin.core.motion import Motion
 from muslin.core.scenarios import fling_motion, smooth_path, swing_motion
-from muslin.core.study.config import ParameterTable, ScenarioTable
+from muslin.core.study.config import ParameterTable
+from muslin.core.study.scenario_table import ScenarioTable
 
 #: Rate of the camera [Hz], and steps of the simulator that is the model and of a finer one [s].
 CAMERA_RATE, TIME_STEP, FINE_STEP = 30.0, 0.005, 0.0025
