@@ -8,6 +8,8 @@ import numpy as np
 
 from ..core.arrays import FloatArray
 
+#: Steps of one-sided differences in the unit cube: the least that rounding allows, and the most that is still local.
+LEAST_STEP, MOST_STEP = 1e-4, 2e-3
 #: Residuals with more chance than this are left out [noise variances].
 MOST_CHANCE = 1.0
 
@@ -24,10 +26,12 @@ class Discrepancy:
     Args:
         directions: ``D``, ``(N_r, K)`` a recording, in units of the noise; recordings without any may be missing.
         chance: diagonal of ``V``, ``(N_r,)`` a recording [noise variances]; the same.
+        step: at which derivatives of residuals are told, between chance and curvature.
     """
 
     directions: Mapping[str, FloatArray] = field(default_factory=dict)
     chance: Mapping[str, FloatArray] = field(default_factory=dict)
+    step: float = MOST_STEP
 
     @cached_property
     def _factors(self) -> dict[str, tuple[FloatArray, FloatArray]]:

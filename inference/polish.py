@@ -15,8 +15,6 @@ from .discrepancy import NONE, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, failed, residual
 
-#: Finite-difference step in the unit cube: small against the prior, large against rounding in a rollout.
-STEP = 2e-3
 #: Least squares starts from another place while it leaves this times what noise leaves, this often at most, from
 #: starts at least so far apart in some coordinate of the unit cube.
 MISFIT, STARTS, APART = 1.5, 4, 0.1
@@ -56,7 +54,8 @@ class Objective:
         space: parameters, in the order of the unit vector.
         recordings: names.
         given: values of other parameters, by recording.
-        discrepancy: how else than by noise a right model may be off; residuals are whitened by it too.
+        discrepancy: how else than by noise a right model may be off; residuals are whitened by it too, and its step is
+            that of derivatives.
     """
 
     def __init__(
@@ -119,7 +118,7 @@ class Objective:
         derivative is unknown and zero, which leaves the prior's uncertainty to that parameter.
         """
         base = self.one(unit)
-        steps = np.where(unit + STEP <= 1.0, STEP, -STEP)
+        steps = np.where(unit + self.discrepancy.step <= 1.0, 1.0, -1.0) * self.discrepancy.step
         columns = np.zeros((len(base), len(unit)))
         missing = np.arange(len(unit))
         for sides in (steps, -steps):

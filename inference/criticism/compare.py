@@ -13,6 +13,7 @@ from ...core.scenario import Scenario
 from ...core.series import PointSeries
 from ...core.store import read, storage_errors
 from ...core.study import Outcome, Study, Task
+from ..discrepancy import Discrepancy
 from ..noise import Noise
 from ..polish import Objective
 from ..residuals import residual
@@ -50,7 +51,9 @@ def compare(study: Study) -> Comparison:
             for k, name in enumerate(names)
         ]
         study.progress("finding what a refit could explain", 0, 0)
-        jacobian = Objective(pool, problem.space, problem.fit_on, fit.noise, offsets).jacobian(unit)
+        discrepancy = Discrepancy(step=fit.derivative_step)
+        objective = Objective(pool, problem.space, problem.fit_on, fit.noise, offsets, discrepancy=discrepancy)
+        jacobian = objective.jacobian(unit)
     study.progress("comparing with what noise gives", 0, 0)
     sorted_by, fitted = partitions(takes), takes[: len(problem.fit_on)]
     tested = adequacy(fitted, partitions(fitted), jacobian, unit, fit.noise, offsets, rng)

@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.errors import MuslinError
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
-from ..discrepancy import NONE, Discrepancy
+from ..discrepancy import Discrepancy
 from ..polish import Objective, Polished, polish
 from ..residuals import Residual
-from ..roughness import chance_of, roughness
+from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
 from .candidate import Candidate, root_mean_square
@@ -29,7 +28,7 @@ class Work:
 
     Attributes:
         discrepancy: how far the model's own numbers may be off, as last seen.
-        rough: what it cannot repeat, a frame ``(T,)`` [m or px], by recording, as last seen.
+        rough: what it cannot repeat, as last seen.
         limit: of rollouts.
         cut_short: whether something was left out for want of them.
     """
@@ -40,8 +39,8 @@ class Work:
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
         self.limit = study.config.diagnose.simulations
         self.cut_short = False
-        self.discrepancy = NONE
-        self.rough: dict[str, FloatArray] = {}
+        self.discrepancy = Discrepancy(step=fit.derivative_step)
+        self.rough = Roughness({}, {}, {})
         self._elsewhere = 0  # rollouts of other engines and meshes
         self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
 
@@ -72,14 +71,8 @@ class Work:
         directions, cost = numerical_directions(self.pool, values, self.fit.noise, self.offsets)
         names = (*self.problem.fit_on, *self.problem.hold_out)
         self.rough = roughness(self.pool, space, unit, names)
-        chance = chance_of(self.rough, self.problem.recordings, self.fit.noise, self.offsets)
-        self.discrepancy = Discrepancy(directions, chance)
-        if self.discrepancy.nothing_counts(self.problem.fit_on):
-            raise MuslinError(
-                "nothing in the fitted recordings can be diagnosed: in every frame next to nothing in the parameters "
-                "moves the model by more than the noise; fit on motions that can be repeated (in the air, trailing), "
-                "or on the part before contact (muslin import --stop)"
-            )
+        self.discrepancy = self.rough.discrepancy(self.problem.recordings, self.fit.noise, self.offsets, directions)
+        check_repeatable(self.discrepancy, self.problem.fit_on)
         self._elsewhere += cost
 
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:

@@ -21,7 +21,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
         return [f"the best fit cannot be simulated: {plain.reason}"]
     out: list[str] = []
     rough = roughness(pool, space, unit, problem.fit_on)
-    if failing := [n for n in problem.fit_on if n not in rough]:
+    if failing := [n for n in problem.fit_on if n not in rough.sd]:
         out.append(f"close to the best fit {', '.join(failing)} cannot be simulated, so ± means little")
     if loose := unrepeatable(rough, problem.recordings, noise):
         out.append(

@@ -17,7 +17,7 @@ from ..noise import Noise, estimate_noise
 from ..observe import Observer
 from ..polish import Objective, Polished, polish_from
 from ..residuals import Offsets, residual
-from ..roughness import chance_of, roughness
+from ..roughness import roughness
 from .bounds import at_bounds, bound_notes
 from .doubts import doubts
 from .draws import ABSENT, FAILED, WHOLE, DrawStore
@@ -71,14 +71,14 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
             proposals.add(posterior, *store.tried(upto))
         study.progress("polishing the best draw by least squares", 0, 0)
         before = pool.count
-        best, found = _polished(study, pool, store, noise, takes, upto)
+        best, step, found = _polished(study, pool, store, noise, takes, upto)
         truer = correlated_noise(noise, _residuals(study, pool, best, noise))
         if truer is not noise:
             study.progress("learning again: the noise is correlated in time", 0, 0)
             noise, takes = truer, _takes(study, truer)
             learner = Learner(study, takes)
             posterior = learner.learn(theta, points, numbers, proposals, k)
-            best, found = _polished(study, pool, store, noise, takes, upto)
+            best, step, found = _polished(study, pool, store, noise, takes, upto)
         simulations = upto * len(takes.simulated) + pool.count - before
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
     # what the model leaves unexplained makes the estimate that much less certain
@@ -97,6 +97,7 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
         "failed": len(store.failures()),
         "seconds": time.monotonic() - began,
         "warnings": warnings,
+        "derivative_step": step,
         "at_bound": [n for i, n in enumerate(space.names) if any(a.index == i for a in held)],
     }
     sd = physical_sd(space, best.unit, best.covariance) * inflation
@@ -126,19 +127,18 @@ def _residuals(study: Study, pool: SimulationPool, best: Polished, noise: Noise)
 
 def _polished(
     study: Study, pool: SimulationPool, store: DrawStore, noise: Noise, takes: Takes, upto: int
-) -> tuple[Polished, list[str]]:
-    """The best fit, and what makes it doubtful."""
+) -> tuple[Polished, float, list[str]]:
+    """The best fit, the step of its derivatives, and what makes it doubtful."""
     problem, offsets = study.problem, offsets_of(study)
     space, names = problem.space, problem.fit_on
     nearest = _draws_in_order(study, store, noise, takes, upto, NONE)[0]
     # what cannot be repeated there must not lead the fit
-    rough = roughness(pool, space, nearest, names)
-    discrepancy = Discrepancy(chance=chance_of(rough, problem.recordings, noise, offsets))
+    discrepancy = roughness(pool, space, nearest, names).discrepancy(problem.recordings, noise, offsets)
     if discrepancy.nothing_counts(names):  # then the nearest is as good as it gets; doubts say that it is chance
         discrepancy = NONE
     objective = Objective(pool, space, names, noise, offsets, discrepancy=discrepancy)
     best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto, discrepancy))
-    return best, doubts(pool, space, best.unit, noise)
+    return best, discrepancy.step, doubts(pool, space, best.unit, noise)
 
 
 def physical_sd(space: ParameterSpace, unit: FloatArray, covariance: FloatArray) -> FloatArray:

@@ -39,6 +39,7 @@ class FitResult:
         simulations: rollouts, the polish included.
         failed: draws that could not be simulated.
         seconds: of the run that finished the fit.
+        derivative_step: of one-sided differences in the unit cube that suits this model; see :mod:`..roughness`.
     """
 
     names: tuple[str, ...]
@@ -54,6 +55,7 @@ class FitResult:
     simulations: int
     failed: int
     seconds: float
+    derivative_step: float
 
     def values(self) -> dict[str, float]:
         """The best fit by name."""
@@ -168,6 +170,7 @@ def load_fit(study: Study) -> FitResult:
             simulations=int(a["simulations"]),
             failed=int(a["failed"]),
             seconds=float(a["seconds"]),
+            derivative_step=float(a["derivative_step"]),
         )
 
 

@@ -89,7 +89,7 @@ def test_models_are_refitted_where_the_diagnosis_kept_none(tmp_path: Path) -> No
     rivals, count = opening.tied_rivals(
         study,
         knowing(study.problem, {"linear-drag": LinearDrag}),
-        load_fit(study).noise,
+        load_fit(study),
         read(study.step_results("fit"), "estimate_unit"),
         opening.Opening("tied", ("linear-drag",)),
     )

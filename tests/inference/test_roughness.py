@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 from buckling import LANDED, buckling_study
 
+from muslin.core.errors import MuslinError
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.core.rollout import Trajectory
 from muslin.core.series import PointSeries
 from muslin.core.study import Task
-from muslin.inference.discrepancy import Discrepancy
+from muslin.inference.discrepancy import LEAST_STEP, MOST_STEP, Discrepancy
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, polish
 from muslin.inference.residuals import Offsets
-from muslin.inference.roughness import chance_of, roughness, unrepeatable
+from muslin.inference.roughness import Roughness, check_repeatable, roughness, unrepeatable
 from muslin.inference.sequential.doubts import doubts
 
 NOISE = Noise(0.001, 0.0, "test", "m", 0.01)
@@ -30,9 +31,9 @@ def test_it_begins_where_the_rope_buckles(study) -> None:  # type: ignore[no-unt
         rough = roughness(pool, problem.space, middle, problem.fit_on)
         said = doubts(pool, problem.space, middle, NOISE)
     time = problem.recordings["down"].series.time
-    assert rough["up"].max() < 0.1 * NOISE.sd
-    assert rough["down"][time < LANDED].max() < 0.1 * NOISE.sd
-    assert rough["down"].max() > 3 * NOISE.sd
+    assert rough.sd["up"].max() < 0.1 * NOISE.sd
+    assert rough.sd["down"][time < LANDED].max() < 0.1 * NOISE.sd
+    assert rough.sd["down"].max() > 3 * NOISE.sd
     assert len(said) == 1 and "chaotic" in said[0] and "down from" in said[0] and "up from" not in said[0]
     (where,) = unrepeatable(rough, problem.recordings, NOISE)
     assert where.startswith("down from 0.")
@@ -48,7 +49,7 @@ class Cubic:
         time = np.linspace(0.0, 1.0, 50)
         made = []
         for task in tasks:
-            x = sum(task.values.values())
+            x = task.values["stiffness"] + 0.3 * task.values["damping"]
             points = np.full((50, 25, 3), 0.1 * x + 30.0 * x**2 + 3.0 * x**3)
             points[25:] += self.chance * self.rng.normal(size=3)
             made.append(Trajectory(PointSeries(time, points), points, np.zeros((50, 1, 7))))
@@ -58,21 +59,33 @@ class Cubic:
 def test_a_model_that_bends_is_not_taken_to_be_chance() -> None:
     space = ParameterSpace((Parameter("stiffness", "N/m", 0, 1), Parameter("damping", "1/s", 0, 1)))
     unit = np.array([0.3, 0.7])
-    smooth = roughness(Cubic(0.0), space, unit, ["fling"])["fling"]  # type: ignore[arg-type]
+    smooth = roughness(Cubic(0.0), space, unit, ["fling"]).sd["fling"]  # type: ignore[arg-type]
     assert smooth.max() < 0.02e-3  # the noise of the best motion capture
     takes = [str(k) for k in range(30)]
-    found = np.mean([sd[-1] for sd in roughness(Cubic(0.01), space, unit, takes).values()])  # type: ignore[arg-type]
+    found = np.mean([sd[-1] for sd in roughness(Cubic(0.01), space, unit, takes).sd.values()])  # type: ignore[arg-type]
     assert found == pytest.approx(0.01, rel=0.15)
+
+
+def test_derivatives_take_short_steps_where_the_model_is_smooth_and_long_ones_where_it_is_not() -> None:
+    space = ParameterSpace((Parameter("stiffness", "N/m", 0, 1), Parameter("damping", "1/s", 0, 1)))
+    unit = np.array([0.3, 0.7])
+    steps = [roughness(Cubic(c), space, unit, ["fling"]).step(NOISE) for c in (0.0, 1e-6, 1e-4)]  # type: ignore[arg-type]
+    assert steps[0] == pytest.approx(LEAST_STEP, rel=0.1)
+    assert steps == sorted(steps) and steps[2] > 2 * steps[1]
+    # 8 ** (1/4) times the root of noise over second derivative; frames that do not count are not asked
+    frames = np.array([1e-6, 1e-6, 1.0])
+    known = Roughness({"fling": frames}, {"fling": frames}, {"fling": np.array([10.0, 10.0, 0.1])})
+    assert known.step(NOISE) == pytest.approx(8**0.25 * np.sqrt(1e-7))
+    assert Roughness({}, {}, {}).step(NOISE) == MOST_STEP
 
 
 def test_a_fit_leaves_it_out(study) -> None:  # type: ignore[no-untyped-def]
     problem = study.problem
     unit = np.full(len(problem.space), 0.5)
     with study.pool() as pool:
-        rough = roughness(pool, problem.space, unit, ["down"])
-        chance = chance_of(rough, problem.recordings, NOISE, Offsets())
+        aware_of = roughness(pool, problem.space, unit, ["down"]).discrepancy(problem.recordings, NOISE, Offsets())
         plain = Objective(pool, problem.space, ["down"], NOISE, Offsets())
-        aware = Objective(pool, problem.space, ["down"], NOISE, Offsets(), discrepancy=Discrepancy(chance=chance))
+        aware = Objective(pool, problem.space, ["down"], NOISE, Offsets(), discrepancy=aware_of)
         blind, sees = polish(plain, unit + 0.003, 1), polish(aware, unit + 0.003, 1)
     assert blind.rss > 3 * blind.count  # at the truth but for a nudge
     assert sees.rss < 1.1 * sees.count < blind.count
@@ -89,4 +102,8 @@ def test_residuals_are_weighed_by_what_is_known_of_chance() -> None:
     assert d.left_to_chance(["fling"]) == pytest.approx(1 / 3)
     assert d.left_to_chance(["other"]) == 0.0
     assert not d.nothing_counts(["fling"]) and not d.nothing_counts(["other"])
-    assert Discrepancy(chance={"fling": v + 2.0}).nothing_counts(["fling"])
+    nothing = Discrepancy(chance={"fling": v + 2.0})
+    assert nothing.nothing_counts(["fling"])
+    check_repeatable(d, ["fling"])
+    with pytest.raises(MuslinError, match="motions that can be repeated"):
+        check_repeatable(nothing, ["fling"])

@@ -201,7 +201,7 @@ def result(mean: float, spread: float, estimate: float, sd: float) -> FitResult:
     draws = mean + spread * np.random.default_rng(0).standard_normal((2000, 1))
     noise = Noise(0.001, 0.0, "test", "m", 0.01)
     return FitResult(
-        ("friction",), ("1",), np.array([estimate]), np.array([sd]), draws, noise, (), (), 2, "all", 10, 0, 1.0
+        ("friction",), ("1",), np.array([estimate]), np.array([sd]), draws, noise, (), (), 2, "all", 10, 0, 1.0, 1e-4
     )
 
 

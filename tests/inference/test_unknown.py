@@ -82,7 +82,7 @@ def test_without_a_misfit_nothing_is_sought(tmp_path: Path) -> None:
     found = step.unknown(study)
     check_json(found.result)
     assert (found.result["verdict"], found.result["law"], found.result["force"]) == ("no-misfit", None, None)
-    assert found.result["simulations"] < 10
+    assert found.result["simulations"] < 20  # seven a recording tell what is chance
     assert "no misfit" in found.text()
 
 

@@ -9,7 +9,7 @@ from ....core.errors import InputError, StepMissingError
 from ....core.powerless import why_powerless
 from ....core.registry import REGISTRY
 from ....core.study import Problem, Study
-from ...noise import Noise
+from ...sequential.result import FitResult
 from .goal import Purpose
 from .rivals import Rival, kept_rival, refitted_rival
 
@@ -77,7 +77,7 @@ def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
 
 
 def tied_rivals(
-    study: Study, problem: Problem, noise: Noise, plain: FloatArray, opening: Opening
+    study: Study, problem: Problem, fit: FitResult, plain: FloatArray, opening: Opening
 ) -> tuple[list[Rival], int]:
     """The models with each of the tied effects, and the rollouts that refitting them took.
 
@@ -90,7 +90,7 @@ def tied_rivals(
     with study.pool(problem) as pool:
         for k, name in enumerate(opening.effects):
             study.progress(f"refitting {name}", k + 1, len(opening.effects))
-            out.append(refitted_rival(study, problem, pool, noise, name, plain, opening.means))
+            out.append(refitted_rival(study, problem, pool, fit, name, plain, opening.means))
         count = pool.count
     return out, count
 

@@ -9,9 +9,10 @@ import numpy as np
 from ....core.arrays import FloatArray
 from ....core.parameters import ParameterSpace
 from ....core.study import Problem, SimulationPool, Study
-from ...noise import Noise
+from ...discrepancy import Discrepancy
 from ...polish import Objective, polish
 from ...sequential.fitting import offsets_of
+from ...sequential.result import FitResult
 
 #: Least-squares evaluations for a model that has to be refitted.
 EVALUATIONS = 10
@@ -96,7 +97,7 @@ def refitted_rival(
     study: Study,
     problem: Problem,
     pool: SimulationPool,
-    noise: Noise,
+    known: FitResult,
     effect: str,
     plain: FloatArray,
     means: Mapping[str, float],
@@ -107,7 +108,7 @@ def refitted_rival(
         study: that is fitted.
         problem: of the study, knowing the classes of the effects.
         pool: of the same problem.
-        noise: of the measurement.
+        known: the study's fit.
         effect: beyond those of the study.
         plain: the fit without them in the unit cube.
         means: coefficients of the diagnosis, ``effect.coefficient`` [units]; may lack some.
@@ -118,7 +119,8 @@ def refitted_rival(
     starts = [none + share * np.where(none < 0.7, 1.0, -1.0) for share in (0.02, TYPICAL)]
     if all(n in means for n in extra.names):
         starts.append(np.clip(extra.to_unit(np.array([means[n] for n in extra.names])), 0.0, 1.0))
-    objective = Objective(pool, space, problem.fit_on, noise, offsets_of(study))
+    discrepancy = Discrepancy(step=known.derivative_step)
+    objective = Objective(pool, space, problem.fit_on, known.noise, offsets_of(study), discrepancy=discrepancy)
     points = np.stack([np.concatenate([plain, s]) for s in starts])
     sizes = [np.inf if w is None else float(w @ w) for w in objective.many(points)]
     fit = polish(objective, points[int(np.argmin(sizes))], EVALUATIONS)

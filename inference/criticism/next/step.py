@@ -15,9 +15,8 @@ from ....core.parameters import ParameterSpace
 from ....core.registry import REGISTRY
 from ....core.store import put, read, storage_errors
 from ....core.study import Problem, Study
-from ...noise import Noise
 from ...sequential.fitting import offsets_of
-from ...sequential.result import load_fit
+from ...sequential.result import FitResult, load_fit
 from ..told import Told
 from ..verdict import MARGIN, SIGNIFICANT
 from .bench import Bench, Proposal
@@ -80,9 +79,10 @@ def propose_next(
     if not scenario.grasps:
         raise InputError(f"{study.path}: no gripper holds the object, so there is no motion to propose")
     limits = limits_within(problem.scenarios.values(), **asked)
-    noise, opening = load_fit(study).noise, opening_of(study, effects)
+    fit, opening = load_fit(study), opening_of(study, effects)
+    noise = fit.noise
     known = knowing(problem, {n: REGISTRY.get("effect", n) for n in opening.all_effects})
-    goal, spent = _goal(study, known, noise, opening)
+    goal, spent = _goal(study, known, fit, opening)
     if goal is not None and (decided := goal.decided()) is not None:
         opening, goal = replace(opening, purpose="nothing", reason=decided), None
     found = Found(None, [], 0, 0)
@@ -103,16 +103,15 @@ def propose_next(
     return NextExperiment(result, tuple(paragraphs), None if best is None else best.motion)
 
 
-def _goal(study: Study, problem: Problem, noise: Noise, opening: Opening) -> tuple[Goal | None, int]:
+def _goal(study: Study, problem: Problem, fit: FitResult, opening: Opening) -> tuple[Goal | None, int]:
     """What a motion has to do, and the rollouts that it took to know."""
     if opening.purpose == "nothing":
         return None, 0
-    fit = study.step_results("fit")
-    plain = Rival(
-        "the model as it is", study.problem.space, read(fit, "estimate_unit"), read(fit, "estimate_covariance")
-    )
+    group = study.step_results("fit")
+    unit, covariance = read(group, "estimate_unit"), read(group, "estimate_covariance")
+    plain = Rival("the model as it is", study.problem.space, unit, covariance)
     if opening.purpose == "tied":
-        models, spent = tied_rivals(study, problem, noise, plain.unit, opening)
+        models, spent = tied_rivals(study, problem, fit, plain.unit, opening)
         return Goal("tied", tuple(models), np.full((len(models), len(models)), MARGIN)), spent
     named = kept_rival(problem, opening.beside, opening.models) if opening.beside else None
     return _unseen_goal(problem, named or plain, opening), 0

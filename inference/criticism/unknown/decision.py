@@ -24,6 +24,7 @@ class Case:
         held_out_plain: root mean square error on each held-out recording [unit].
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
+        unsure: what else may be left or not, as the model cannot be repeated [noise variances].
         tried: laws that were looked at, for the significance.
         laws: those that were refitted.
     """
@@ -33,17 +34,19 @@ class Case:
     held_out_plain: dict[str, float]
     noise_sd: float
     noise_error: float
+    unsure: float = 0.0
     tried: int = 1
     laws: tuple[RefittedLaw, ...] = ()
 
     @property
     def has_misfit(self) -> bool:
         """More than the noise, and what is not known of it, explain."""
-        return is_misfit(self.rss_plain, self.count, self.noise_error)
+        return is_misfit(self.rss_plain, self.count, self.noise_error, self.unsure)
 
     def explained(self, law: RefittedLaw) -> float:
         """Share of the excess misfit on fitted recordings that goes away with a law, 0 to 1."""
-        floor = min([self.count + chance(self.count, self.noise_error), *(c.rss for c in self.laws)])
+        allowed = chance(self.count, self.noise_error) + self.unsure
+        floor = min([self.count + allowed, *(c.rss for c in self.laws)])
         return float(np.clip((self.rss_plain - law.rss) / max(self.rss_plain - floor, 2 * MARGIN), 0.0, 1.0))
 
     def explained_held_out(self, law: RefittedLaw) -> float | None:

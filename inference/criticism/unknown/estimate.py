@@ -10,8 +10,8 @@ from ....core.measurement import Recording
 from ....core.parameters import ParameterSpace
 from ....core.rollout import Trajectory
 from ....core.study import Outcome, SimulationPool, Task
+from ...discrepancy import Discrepancy
 from ...noise import Noise
-from ...polish import STEP
 from ...residuals import Offsets, residual
 from .basis import Basis
 from .field import PULL
@@ -78,7 +78,7 @@ class Estimate:
         slopes: their derivatives by all unknowns, one ``(N, D + sum K)`` a recording.
         smooth: precision of the smoothest functions [s4/m2].
         paths: of the vertices ``(T, V, 3)`` [m], one a recording.
-        information: of one residual.
+        count: independent numbers that the residuals are worth.
         rss_without: residual sum of squares without the force, the parameters as they were fitted.
     """
 
@@ -89,7 +89,7 @@ class Estimate:
     slopes: list[FloatArray]
     smooth: float
     paths: list[FloatArray]
-    information: float
+    count: float
     rss_without: float
 
     @property
@@ -100,11 +100,6 @@ class Estimate:
     def explained(self) -> float:
         """Share of the excess misfit that goes away with the force, 0 to 1."""
         return float(np.clip((self.rss_without - self.rss) / max(self.rss_without - self.count, 1e-9), 0.0, 1.0))
-
-    @property
-    def count(self) -> float:
-        """Independent numbers among the residuals."""
-        return self.information * sum(len(w) for w in self.white)
 
     def covariance(self) -> FloatArray:
         """Of the point (Laplace), ``(D + sum K,) * 2``."""
@@ -120,10 +115,19 @@ class Estimate:
 
 
 class ForceObjective:
-    """White residuals of some recordings as a function of parameters and forces."""
+    """White residuals of some recordings as a function of parameters and forces.
 
-    def __init__(self, pool: SimulationPool, unknowns: Unknowns, noise: Noise, offsets: Offsets) -> None:
+    Args:
+        pool, unknowns: where rollouts run, and what they are a function of.
+        noise, offsets: of the measurement.
+        discrepancy: what the model cannot repeat, which no force should explain.
+    """
+
+    def __init__(
+        self, pool: SimulationPool, unknowns: Unknowns, noise: Noise, offsets: Offsets, discrepancy: Discrepancy
+    ) -> None:
         self.pool, self.unknowns, self.noise, self.offsets = pool, unknowns, noise, offsets
+        self.discrepancy = discrepancy
         self.recordings = [pool.problem.recordings[n] for n in unknowns.recordings]
 
     def look(self, points: Sequence[FloatArray]) -> list[tuple[list[FloatArray], list[FloatArray]] | None]:
@@ -151,7 +155,7 @@ class ForceObjective:
                 steps = {}
                 for k in own:
                     step = np.zeros(len(point))
-                    step[k] = side * (_inward(point[k]) if k < len(u.space) else FORCE_STEP)
+                    step[k] = side * (self._inward(point[k]) if k < len(u.space) else FORCE_STEP)
                     steps[k] = step
                 made = self.pool.map([Task(u.values(point + s, r), name) for s in steps.values()])
                 failed = []
@@ -167,6 +171,11 @@ class ForceObjective:
             out.append(matrix)
         return out
 
+    def count(self, white: Sequence[FloatArray]) -> float:
+        """Independent numbers that residuals, an array a recording, are worth."""
+        dropped = self.discrepancy.dropped(self.unknowns.recordings)
+        return self.noise.information * (sum(len(w) for w in white) - dropped)
+
     def derivatives(self, estimate: Estimate, number: int, steps: dict[str, float]) -> list[FloatArray]:
         """Derivatives ``(N,)`` of one recording's residuals by further values, from zero; zero where one fails."""
         u = self.unknowns
@@ -179,12 +188,13 @@ class ForceObjective:
         ]
 
     def _white(self, recording: Recording, made: Trajectory) -> FloatArray:
-        return residual(recording, made.series, self.noise, self.offsets).white
+        white = residual(recording, made.series, self.noise, self.offsets).white
+        return self.discrepancy.whitened(recording.name, white)
 
     def _or_none(self, recording: Recording, made: Outcome) -> FloatArray | None:
         return self._white(recording, made) if isinstance(made, Trajectory) else None
 
-
-def _inward(unit: float) -> float:
-    """A step of a parameter that stays inside its prior."""
-    return STEP if unit + STEP <= 1 - INSIDE else -STEP
+    def _inward(self, unit: float) -> float:
+        """A step of a parameter that stays inside its prior."""
+        step = self.discrepancy.step
+        return step if unit + step <= 1 - INSIDE else -step

@@ -18,4 +18,6 @@ def held_objective(force: ForceObjective, space: ParameterSpace) -> Objective:
     """
     u = force.unknowns
     pulls = {r: {f"{e}.{PULL}": p} for r, e, p in zip(u.recordings, u.effects, u.pulls, strict=True)}
-    return Objective(force.pool, space, u.recordings, force.noise, force.offsets, given=pulls)
+    return Objective(
+        force.pool, space, u.recordings, force.noise, force.offsets, given=pulls, discrepancy=force.discrepancy
+    )

@@ -7,6 +7,7 @@ import numpy as np
 from ....core.arrays import FloatArray
 from ....core.parameters import Parameter, ParameterSpace
 from ....core.study import Problem, SimulationPool
+from ...discrepancy import Discrepancy
 from ...noise import Noise
 from ...polish import Objective, Polished, polish
 from ...residuals import Offsets
@@ -79,19 +80,28 @@ class Refits:
         pool: whose problem has the effect ``law``.
         problem: the study's, without it.
         noise, offsets: of the measurement.
+        discrepancy: what the model cannot repeat.
         parameters: of the effect, by coefficient.
     """
 
     def __init__(
-        self, pool: SimulationPool, problem: Problem, noise: Noise, offsets: Offsets, parameters: dict[str, Parameter]
+        self,
+        pool: SimulationPool,
+        problem: Problem,
+        noise: Noise,
+        offsets: Offsets,
+        discrepancy: Discrepancy,
+        parameters: dict[str, Parameter],
     ) -> None:
         self.pool, self.problem, self.noise, self.offsets = pool, problem, noise, offsets
+        self.discrepancy = discrepancy
         self.parameters = parameters
 
     def objective(self, coefficients: tuple[str, ...]) -> Objective:
         extra = tuple(self.parameters[c] for c in coefficients)
         space = self.problem.space + ParameterSpace(extra)
-        return Objective(self.pool, space, self.problem.fit_on, self.noise, self.offsets)
+        names = self.problem.fit_on
+        return Objective(self.pool, space, names, self.noise, self.offsets, discrepancy=self.discrepancy)
 
     def first(self, guess: Guess, unit: FloatArray, force: ForceObjective) -> RefittedLaw:
         """The law polished on a held model from where the search left it; ``unit`` are the parameters there."""

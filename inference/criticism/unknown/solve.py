@@ -50,7 +50,7 @@ def estimate_force(objective: ForceObjective, starts: Sequence[FloatArray], cent
             slopes = objective.slopes(point, white)
         curved = False
         for _ in range(STEPS):
-            scale = max(1.0, sum(float(w @ w) for w in white) / (objective.noise.information * _length(white)))
+            scale = max(1.0, sum(float(w @ w) for w in white) / objective.count(white))
             smooth = most_probable(u, slopes, white, point, centre, scale)
             target = solved(u, slopes, white, point, centre, smooth, scale)
             trials = [point + share * (target - point) for share in SHARES]
@@ -74,15 +74,11 @@ def estimate_force(objective: ForceObjective, starts: Sequence[FloatArray], cent
                 break
         if not curved:
             break
-    return Estimate(u, point, centre, white, slopes, smooth, paths, objective.noise.information, without)
+    return Estimate(u, point, centre, white, slopes, smooth, paths, objective.count(white), without)
 
 
 def _inside(unit: FloatArray) -> FloatArray:
     return np.clip(unit, INSIDE, 1 - INSIDE)
-
-
-def _length(white: list[FloatArray]) -> int:
-    return sum(len(w) for w in white)
 
 
 def _cost(

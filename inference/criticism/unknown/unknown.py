@@ -12,8 +12,10 @@ from ....core.errors import MuslinError
 from ....core.registry import REGISTRY
 from ....core.store import put, read, storage_errors
 from ....core.study import Problem, SimulationPool, Study
+from ...discrepancy import Discrepancy
 from ...polish import Objective
 from ...residuals import Offsets
+from ...roughness import check_repeatable, roughness
 from ...sequential.fitting import offsets_of
 from ...sequential.result import FitResult, load_fit
 from ..misfit import NEGLIGIBLE
@@ -45,15 +47,20 @@ def unknown(study: Study) -> Finding:
     began, fit, problem = time.monotonic(), load_fit(study), study.problem
     offsets, unit = offsets_of(study), read(study.step_results("fit"), "estimate_unit")
     with study.pool(problem) as pool:
-        plain = _plain(pool, problem, fit, offsets, unit)
-        held_out = Refits(pool, problem, fit.noise, offsets, {}).held_out(problem.space, unit)
+        rough = roughness(pool, problem.space, unit, problem.fit_on)
+        discrepancy = rough.discrepancy(problem.recordings, fit.noise, offsets)
+        plain = _plain(pool, problem, fit, offsets, discrepancy, unit)
+        held_out = Refits(pool, problem, fit.noise, offsets, discrepancy, {}).held_out(problem.space, unit)
         count = pool.count
+    check_repeatable(discrepancy, problem.fit_on)
+    numbers = sum(len(w) for w in plain.values()) - discrepancy.dropped(problem.fit_on)
     case = Case(
         rss_plain=sum(float(w @ w) for w in plain.values()),
-        count=max(fit.noise.information * sum(len(w) for w in plain.values()) - len(unit), 1.0),
+        count=max(fit.noise.information * numbers - len(unit), 1.0),
         held_out_plain=held_out,
         noise_sd=fit.noise.sd,
         noise_error=fit.noise.relative_error,
+        unsure=fit.noise.information * discrepancy.left_to_chance(problem.fit_on),
     )
     estimate: Estimate | None = None
     decision: LawDecision | None = None
@@ -62,7 +69,7 @@ def unknown(study: Study) -> Finding:
         names = [n for n in problem.fit_on if n in names]
         unknowns, full, aims = _unknowns(problem, names)
         with study.pool(full) as pool:
-            objective, starts = _objective(study, pool, unknowns, aims, fit, offsets)
+            objective, starts = _objective(study, pool, unknowns, aims, fit, offsets, discrepancy)
             study.progress("estimating the missing force", 0, 0)
             estimate = estimate_force(objective, starts, unit)
             case, decision = _law(study, objective, problem, estimate, case)
@@ -83,12 +90,18 @@ def unknown(study: Study) -> Finding:
 
 
 def _plain(
-    pool: SimulationPool, problem: Problem, fit: FitResult, offsets: Offsets, unit: FloatArray
+    pool: SimulationPool,
+    problem: Problem,
+    fit: FitResult,
+    offsets: Offsets,
+    discrepancy: Discrepancy,
+    unit: FloatArray,
 ) -> dict[str, FloatArray]:
     """White residuals of the fitted model, by recording."""
     out = {}
     for name in problem.fit_on:
-        (white,) = Objective(pool, problem.space, [name], fit.noise, offsets).many(unit[None])
+        objective = Objective(pool, problem.space, [name], fit.noise, offsets, discrepancy=discrepancy)
+        (white,) = objective.many(unit[None])
         if white is None:
             raise MuslinError(f"the best fit cannot be simulated on recording {name!r}; fit again")
         out[name] = white
@@ -112,7 +125,13 @@ def _unknowns(problem: Problem, names: Sequence[str]) -> tuple[Unknowns, Problem
 
 
 def _objective(
-    study: Study, pool: SimulationPool, unknowns: Unknowns, aims: list[Aim | None], fit: FitResult, offsets: Offsets
+    study: Study,
+    pool: SimulationPool,
+    unknowns: Unknowns,
+    aims: list[Aim | None],
+    fit: FitResult,
+    offsets: Offsets,
+    discrepancy: Discrepancy,
 ) -> tuple[ForceObjective, list[FloatArray]]:
     """Residuals of a model that is pulled as little as it must be, and starts: no force, and a first one."""
     unit = study.problem.space.to_unit(fit.estimate)
@@ -125,7 +144,7 @@ def _objective(
     unknowns = replace(unknowns, pulls=tuple(pull for _, pull in learned))
     none = np.concatenate([unit, np.zeros(sum(map(len, unknowns.bases)))])
     starts = [none, np.concatenate([unit, *(force for force, _ in learned)])]
-    return ForceObjective(pool, unknowns, fit.noise, offsets), starts
+    return ForceObjective(pool, unknowns, fit.noise, offsets, discrepancy), starts
 
 
 def _law(
@@ -139,7 +158,7 @@ def _law(
     study.progress("searching for a law", 0, 0)
     guesses = best_laws(estimate, responses(objective, law, pieces, estimate), pieces)
     parameters = {p.name.removeprefix(f"{LAW}."): p for p in law.parameters()}
-    refits = Refits(objective.pool, problem, objective.noise, objective.offsets, parameters)
+    refits = Refits(objective.pool, problem, objective.noise, objective.offsets, objective.discrepancy, parameters)
     held: dict[int, RefittedLaw] = {}  # the best of each number of pieces: only a model left to itself compares them
     for k, guess in enumerate(guesses):
         study.progress("refitting laws", k + 1, len(guesses))
