@@ -118,7 +118,8 @@ def _put_fit(study: Study, noise: float) -> None:
     about = {"sd": noise, "ar1": 0.0, "source": "given", "unit": "m", "relative_error": 0.02}
     group.attrs.update(
         parameters=list(space.names), units=list(space.units), noise=about, at_bound=[], warnings=[], rounds=1,
-        ended="made up", simulations=1, failed=0, seconds=1.0, fingerprint=study.fingerprint("fit"), finished=True,
+        ended="made up", simulations=1, failed=0, seconds=1.0, derivative_step=1e-4,
+        fingerprint=study.fingerprint("fit"), finished=True,
     )  # fmt: skip
 
 

@@ -95,7 +95,7 @@ def fitted_study(folder: Path, push: Push | None, hold_out: tuple[str, ...] = ("
         put(group, "estimate_unit", fit.unit, ["parameter"])
         group.attrs.update(
             parameters=list(problem.space.names), units=list(problem.space.units), noise=noise.as_dict(), at_bound=[],
-            warnings=[], rounds=1, ended="made up", simulations=1, failed=0, seconds=0.0,
+            warnings=[], rounds=1, ended="made up", simulations=1, failed=0, seconds=0.0, derivative_step=1e-4,
             fingerprint=study.fingerprint("fit"), finished=True,
         )  # fmt: skip
     return study
