@@ -13,6 +13,7 @@ from muslin.core.powerless import why_powerless
 from muslin.core.registry import REGISTRY
 from muslin.core.store import read
 from muslin.core.study import Problem, SimulationPool, Study
+from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective
 from muslin.inference.residuals import Offsets
@@ -38,7 +39,7 @@ class Trial:
         study: fitted.
         problem: of the study, with every candidate effect in it.
         pool: of this problem.
-        noise: as the fit has found it.
+        noise, step: as the fit has found them: of the measurement, and of derivatives in the unit cube.
         unit: the best fit of the model without effects ``(D,)``, in the unit cube.
         candidates: names of the effects that can act.
         draws: that may be simulated beforehand for all cases of a setting.
@@ -50,6 +51,7 @@ class Trial:
     problem: Problem
     pool: SimulationPool
     noise: Noise
+    step: float
     unit: FloatArray
     candidates: tuple[str, ...]
     draws: int
@@ -58,7 +60,9 @@ class Trial:
     def objective(self, *effects: str) -> Objective:
         """Residuals of the model with these effects, on the fitted recordings."""
         space = self.problem.with_effects(*effects).space
-        return Objective(self.pool, space, self.problem.fit_on, self.noise, Offsets())
+        return Objective(
+            self.pool, space, self.problem.fit_on, self.noise, Offsets(), discrepancy=Discrepancy(step=self.step)
+        )
 
     def start(self, effect: str) -> FloatArray:
         """The best fit with the effect in the model, but off."""
@@ -78,6 +82,6 @@ def make_trial(case: Case, study: Study, draws: int, cache: Path) -> Iterator[Tr
     )
     effects: dict[str, type[Effect]] = {n: REGISTRY.get("effect", n) for n in names}
     problem = replace(study.problem, effects=effects)
-    unit = read(study.step_results("fit"), "estimate_unit")
+    fit, unit = load_fit(study), read(study.step_results("fit"), "estimate_unit")
     with study.pool(problem) as pool:
-        yield Trial(case, study, problem, pool, load_fit(study).noise, unit, names, draws, cache)
+        yield Trial(case, study, problem, pool, fit.noise, fit.derivative_step, unit, names, draws, cache)
