@@ -28,3 +28,8 @@ class Draws:
         """From arrays that were checked."""
         unit = torch.tensor(theta)
         return cls(unit, probit(unit), torch.tensor(weights))
+
+    def among(self, rows: Tensor) -> "Draws":
+        """Those of some rows, bool ``(N,)``; their weights again have a mean of one."""
+        weights = self.weights[rows]
+        return Draws(self.unit[rows], self.latent[rows], weights / weights.mean())

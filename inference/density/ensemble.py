@@ -73,9 +73,9 @@ def train_ensemble(
     What starts best stays as it started: the state before the first step counts.
 
     Args:
-        members: networks of one shape.
-        inputs: tensors whose first axis is the draws.
-        z: ``(N, D)`` targets.
+        members: E networks of one shape.
+        inputs: tensors whose first two axes are the members and the draws; each member may read what others do not.
+        z: ``(E, N, D)`` targets.
         weights: ``(N,)``.
         held: ``(E, N)`` of :func:`left_out`: as many for every member.
         schedule: how.
@@ -119,7 +119,7 @@ def train_ensemble(
         if waited >= schedule.patience:
             break
     stack.restore(state)
-    scores = torch.full((len(z),), torch.nan)
+    scores = torch.full((z.shape[1],), torch.nan)
     scores[test] = stack.score(test).cpu()
     for k, member in enumerate(members):
         stack.write(k, member)
@@ -132,7 +132,7 @@ def _rate(part: float) -> float:
 
 
 class _Stack:
-    """The members' parameters with a leading axis, and the inputs they share."""
+    """The members' parameters, inputs and targets, with the members as leading axis."""
 
     def __init__(
         self, members: Sequence[DensityNetwork], inputs: list[Tensor], z: Tensor, device: torch.device
@@ -152,7 +152,8 @@ class _Stack:
 
     def log_prob(self, rows: Tensor) -> Tensor:
         """``(E, B)`` log densities of draws ``rows (E, B)``."""
-        return self.call(self.named, self.buffers, self.z[rows], *[t[rows] for t in self.inputs])
+        member = torch.arange(len(rows))[:, None]
+        return self.call(self.named, self.buffers, self.z[member, rows], *[t[member, rows] for t in self.inputs])
 
     def score(self, rows: Tensor) -> Tensor:
         with torch.no_grad():

@@ -5,25 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray
 from ..posterior.flow import FlowPosterior
 from ..posterior.latent import LatentDensity, LatentFlow, LatentMixture
-from .coordinates import NAMES, STRAIGHT, Coordinates, fitted_scale
+from .coordinates import NAMES, STRAIGHT, Coordinates
+from .draws import Draws
 from .ensemble import Schedule, left_out, train_ensemble
-from .first_guess import FirstGuess
 from .flow import FlowNetwork, FlowShape
+from .linear_density import LinearDensity, White
 from .mixture_head import MixtureHead
 from .networks import SummaryNetwork
-from .sparse_regression import shrunk_factor
 from .stacking import stack
 from .training import DensityNetwork
+from .view import Known, Seen, View
 
-# Training targets nearer to a face of the cube than this are moved to it: hundreds of draws resolve no more.
-_FACE = 1e-4
-# A prediction nearer than this is read as lying there.
-_GUESS_FACE = 0.01
 # Coordinates about nothing or about a guess are left out untried when the other's linear density is this much better
 # [nats].
 _DECISIVE = 0.5
@@ -33,7 +29,11 @@ _LEAST = 0.01
 
 @dataclass(frozen=True)
 class Shape:
-    """Which densities are tried, and how large they are; see :class:`~..estimators.npe_settings.Settings`."""
+    """Which densities are tried, and how large they are; see :class:`~..estimators.npe_settings.Settings`.
+
+    Args:
+        principal, shown: of :class:`~.view.View`.
+    """
 
     heads: tuple[str, ...]
     members: int
@@ -43,41 +43,51 @@ class Shape:
     hidden: tuple[int, ...]
     transforms: int
     bins: int
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """What a density reads of draws, or of a measurement.
-
-    Args:
-        columns: ``(N, F)`` standardised features.
-        guess: ``(N, D)`` predictions of the parameters in the unit cube, of training draws each made without the
-            draw; None where there are none. No network reads them.
-    """
-
-    columns: FloatArray
-    guess: FloatArray | None
+    principal: int
+    shown: int
 
 
 @dataclass(frozen=True, eq=False)
 class _Group:
-    """Densities that share a weight: at a measurement, and what they said of left-out draws (on the cube)."""
+    """Densities that share a weight.
 
-    at: Callable[["Seen"], list[LatentDensity]]
+    Args:
+        at: a measurement as each member sees it to the densities.
+        scores: ``(N,)`` log density on the cube of every draw under the member that left it out; NaN where none did.
+    """
+
+    at: Callable[[list[Seen]], Sequence[LatentDensity]]
     scores: FloatArray
 
 
-class StackedDensity:
-    """``q(u | f)``, a mixture of densities of several kinds, each trained on what a linear density leaves over.
-
-    First a sparse linear regression (:class:`~.sparse_regression.SparseRegression`), in one or both kinds of
-    coordinates; then ensembles of mixture density networks and of spline flows on its whitened errors, so that they
-    start at the linear density; beside them the linear density itself and the flat one. How much each counts is
-    found by stacking: the weights that maximise the mean log density of draws that were left out.
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """The members' linear densities in one kind of coordinates, and draws as each of them sees these.
 
     Args:
-        seen: the training draws; unit: ``(N, D)``; weights: ``(N,)``.
-        shown: indices of those that the networks read; the regression reads all.
+        linear: one a member.
+        white: ``(E, N, D)`` and ``(E, N)``.
+        group: the linear densities themselves.
+    """
+
+    linear: list[LinearDensity]
+    white: White
+    group: _Group
+
+
+class StackedDensity:
+    """``q(u | x)``, a mixture of densities of several kinds, each trained on what a linear density leaves over.
+
+    Each member leaves out some of the draws and makes everything without them: the columns that it reads and its
+    regressions (:class:`~.view.View`); in one or more kinds of coordinates a linear density
+    (:class:`~.linear_density.LinearDensity`); and mixture density networks and spline flows on its whitened errors,
+    which so start at the linear density. Beside these stands the flat density. How much each kind counts is found by
+    stacking: the weights that maximise the mean log density of the draws left out. These must be as strange to the
+    member as a measurement will be, or the widths that suit them would be too narrow.
+
+    Args:
+        known: of the training draws.
+        draws: their parameters and weights.
         shape, schedule: what is trained and how.
         generator: of all that is random.
         device: where.
@@ -88,22 +98,28 @@ class StackedDensity:
 
     def __init__(
         self,
-        seen: Seen,
-        shown: IntArray,
-        unit: FloatArray,
-        weights: FloatArray,
+        known: Known,
+        draws: Draws,
         shape: Shape,
         schedule: Schedule,
         generator: torch.Generator,
         device: torch.device,
     ) -> None:
         self._shape, self._schedule, self._generator, self._device = shape, schedule, generator, device
-        self._seen, self._shown, self._weights = seen, shown, weights
-        self._held = left_out(len(unit), shape.members, shape.held_out, generator)
-        dim = unit.shape[1]
+        self._unit, self._weights = draws.unit.numpy(), draws.weights.numpy()
+        self._held = left_out(len(self._unit), shape.members, shape.held_out, generator)
+        self._views = [View(known.among(~h), draws.among(~h), shape.principal, shape.shown) for h in self._held]
+        self._left = [view(known.among(h)) for view, h in zip(self._views, self._held, strict=True)]
+        # Networks that are trained in one go have inputs of one width.
+        self._width = max(len(view.shown) for view in self._views)
+        self._context = self._both(
+            [view.context(view.training, self._width) for view in self._views],
+            [view.context(seen, self._width) for view, seen in zip(self._views, self._left, strict=True)],
+        )
+        dim = self._unit.shape[1]
         flat = LatentMixture(Coordinates.probit(dim), np.ones(1), np.zeros((1, dim)), np.eye(dim)[None])
-        groups = {"flat": _Group(lambda f: [flat], np.zeros(len(unit)))}
-        bases = self._bases(unit)
+        groups = {"flat": _Group(lambda seen: [flat], np.zeros(len(self._unit)))}
+        bases = self._bases()
         groups |= {f"linear, {name}": base.group for name, base in bases.items()}
         tried = {name: base.group for name, base in bases.items()}
         if "mixture" in shape.heads:
@@ -114,139 +130,98 @@ class StackedDensity:
             best = max(tried, key=lambda name: self._mean(tried[name]))
             groups[f"flow, {best}"] = self._networks("flow", bases[best])
         scored = np.isfinite(np.stack([g.scores for g in groups.values()])).all(axis=0)
-        found = stack(np.stack([g.scores[scored] for g in groups.values()], axis=1), weights[scored])
+        found = stack(np.stack([g.scores[scored] for g in groups.values()], axis=1), self._weights[scored])
         found = np.where(found < _LEAST, 0.0, found) / found[found >= _LEAST].sum()
         self.weights = {name: float(w) for name, w in zip(groups, found, strict=True) if w > 0}
         self._groups = {name: groups[name] for name in self.weights}
 
-    def posterior(self, seen: Seen) -> FlowPosterior:
+    def posterior(self, known: Known) -> FlowPosterior:
         """The density at one measurement."""
-        weights, parts = [], []
+        seen = [view(known) for view in self._views]
+        weights: list[float] = []
+        parts: list[LatentDensity] = []
         for name, group in self._groups.items():
             members = group.at(seen)
             weights += [self.weights[name] / len(members)] * len(members)
             parts += members
         return FlowPosterior(np.array(weights), parts)
 
+    def _both(self, trained: list[FloatArray], left: list[FloatArray]) -> FloatArray:
+        """``(E, N, ...)`` of what each member has of the draws that it was made from and of those that it left out."""
+        held = self._held.numpy()
+        both = np.zeros((*held.shape, *left[0].shape[1:]))
+        for row, h, own, other in zip(both, held, trained, left, strict=True):
+            row[~h], row[h] = own, other
+        return both
+
+    def _of_left(self, each: FloatArray) -> FloatArray:
+        """``(N,)`` of ``(E, N)``: every draw's under the member that left it out; NaN where none did."""
+        out = np.full(len(self._unit), np.nan)
+        member, draw = np.nonzero(self._held.numpy())
+        out[draw] = each[member, draw]
+        return out
+
     def _mean(self, group: _Group) -> float:
         scored = np.isfinite(group.scores)
         return float((self._weights * np.where(scored, group.scores, 0.0)).sum() / self._weights[scored].sum())
 
-    def _bases(self, unit: FloatArray) -> "dict[str, _Base]":
+    def _bases(self) -> dict[str, _Base]:
         wanted = NAMES if self._shape.coordinates == "auto" else (self._shape.coordinates,)
-        bases = {name: _Base.fit(name, self._seen, unit, self._weights) for name in wanted}
+        bases = {name: self._base(name) for name in wanted}
         if self._shape.coordinates == "auto":
-            if (bases["box"].scale < 2.0 * STRAIGHT).all():
+            if all((linear.scale < 2.0 * STRAIGHT).all() for linear in bases["box"].linear):
                 del bases["straight"]  # the same, nearly
             gain = self._mean(bases["box"].group) - self._mean(bases["probit"].group)
             if abs(gain) > _DECISIVE:
                 bases = {name: base for name, base in bases.items() if (name == "probit") == (gain < 0)}
         return bases
 
-    def _networks(self, head: str, base: "_Base") -> _Group:
-        s, (draws, dim) = self._shape, base.white.shape
-        features = len(self._shown)
-        flow = FlowShape(features, dim, s.transforms, s.hidden, s.bins)
+    def _base(self, name: str) -> _Base:
+        held = self._held.numpy()
+        linear = [
+            LinearDensity.fit(name, view, self._unit[~h], self._weights[~h])
+            for view, h in zip(self._views, held, strict=True)
+        ]
+        own = [density.training for density in linear]
+        left = [d.white(seen, self._unit[h]) for d, seen, h in zip(linear, self._left, held, strict=True)]
+        white = White(
+            self._both([w.errors for w in own], [w.errors for w in left]),
+            self._both([w.volume for w in own], [w.volume for w in left]),
+        )
+        group = _Group(
+            lambda seen: [d.density(s) for d, s in zip(linear, seen, strict=True)], self._of_left(white.log_prob)
+        )
+        return _Base(linear, white, group)
+
+    def _networks(self, head: str, base: _Base) -> _Group:
+        s, (members, draws, dim) = self._shape, base.white.errors.shape
+        flow = FlowShape(self._width, dim, s.transforms, s.hidden, s.bins)
 
         def made() -> DensityNetwork:
             if head == "flow":
                 return FlowNetwork(flow)
-            return SummaryNetwork(features, s.hidden, MixtureHead(s.hidden[-1], dim, s.components, torch.ones(dim)))
+            return SummaryNetwork(self._width, s.hidden, MixtureHead(s.hidden[-1], dim, s.components, torch.ones(dim)))
 
-        members = [made() for _ in range(s.members)]
-        context = torch.tensor(self._seen.columns[:, self._shown], dtype=torch.float32)
-        inputs = [context] if head == "flow" else [context, torch.zeros(draws, dim)]
+        networks = [made() for _ in range(members)]
+        context = torch.tensor(self._context, dtype=torch.float32)
+        inputs = [context] if head == "flow" else [context, torch.zeros(members, draws, dim)]
         scores = train_ensemble(
-            members, inputs, torch.tensor(base.white, dtype=torch.float32),
+            networks, inputs, torch.tensor(base.white.errors, dtype=torch.float32),
             torch.tensor(self._weights, dtype=torch.float32), self._held, self._schedule, self._generator, self._device,
         )  # fmt: skip
-        at = base.flows(members, self._shown) if head == "flow" else base.mixtures(members, self._shown)
-        return _Group(at, scores.numpy().astype(float) + base.volume)
 
+        def at(seen: list[Seen]) -> list[LatentDensity]:
+            return [self._density(*of) for of in zip(networks, base.linear, self._views, seen, strict=True)]
 
-@dataclass(frozen=True, eq=False)
-class _Base:
-    """The linear density in one kind of coordinates, and the whitened errors that the networks learn.
+        return _Group(at, scores.numpy().astype(float) + self._of_left(base.white.volume))
 
-    Args:
-        at: a measurement to coordinates and the centre ``(D,)`` of the errors in them.
-        cholesky: ``(D, D)``, what the errors are whitened by.
-        white: ``(N, D)``, the left-out ones of the training draws.
-        volume: ``(N,)``, what turns a log density of whitened errors into one on the cube.
-        scale: ``(D,)`` of the coordinates.
-    """
-
-    at: Callable[[Seen], tuple[Coordinates, FloatArray]]
-    cholesky: FloatArray
-    white: FloatArray
-    volume: FloatArray
-    scale: FloatArray
-
-    @classmethod
-    def fit(cls, name: str, seen: Seen, unit: FloatArray, weights: FloatArray) -> "_Base":
-        unit = np.clip(unit, _FACE, 1.0 - _FACE)
-        dim = unit.shape[1]
-        if name == "probit":
-            probit = Coordinates.probit(dim)
-            z = probit.to_latent(unit)
-            first = FirstGuess.fit(seen.columns, z, weights, _inner(probit, seen.guess))
-            errors, slope, scale = first.residual, probit.log_slope(unit, z), probit.scale
-
-            def at(f: Seen) -> tuple[Coordinates, FloatArray]:
-                return probit, first.mean(f.columns, _inner(probit, f.guess))[0]
-        else:
-            first = FirstGuess.fit(seen.columns, unit, weights, seen.guess)
-            guess = unit - first.residual
-            scale = fitted_scale(guess, unit, weights)
-            if name == "straight":
-                scale = np.minimum(scale, STRAIGHT)
-            about = Coordinates.about(guess, scale)
-            errors = about.to_latent(unit)
-            slope = about.log_slope(unit, errors)
-
-            def at(f: Seen) -> tuple[Coordinates, FloatArray]:
-                return Coordinates.about(first.mean(f.columns, f.guess)[0], scale), np.zeros(dim)
-
-        cholesky = shrunk_factor(errors, weights)
-        white = np.linalg.solve(cholesky, errors.T).T
-        return cls(at, cholesky, np.asarray(white), slope.sum(axis=1) - np.log(np.diagonal(cholesky)).sum(), scale)
-
-    @property
-    def group(self) -> _Group:
-        """The linear density itself."""
-
-        def density(f: Seen) -> list[LatentDensity]:
-            coordinates, center = self.at(f)
-            return [LatentMixture(coordinates, np.ones(1), center[None], self.cholesky[None])]
-
-        norm = 0.5 * self.white.shape[1] * np.log(2.0 * np.pi)
-        return _Group(density, -0.5 * (self.white**2).sum(axis=1) - norm + self.volume)
-
-    def flows(self, members: Sequence[DensityNetwork], shown: IntArray) -> Callable[[Seen], list[LatentDensity]]:
-        flows = [m for m in members if isinstance(m, FlowNetwork)]
-
-        def density(f: Seen) -> list[LatentDensity]:
-            coordinates, center = self.at(f)
-            return [LatentFlow(coordinates, f.columns[0, shown], center, self.cholesky, m) for m in flows]
-
-        return density
-
-    def mixtures(self, members: Sequence[DensityNetwork], shown: IntArray) -> Callable[[Seen], list[LatentDensity]]:
-        def density(f: Seen) -> list[LatentDensity]:
-            context, start = torch.tensor(f.columns[:, shown], dtype=torch.float32), torch.zeros(1, self.white.shape[1])
-            return [self._mixture(f, [t[0].double() for t in m(context, start)]) for m in members]
-
-        return density
-
-    def _mixture(self, f: Seen, outputs: list[Tensor]) -> LatentMixture:
-        coordinates, center = self.at(f)
-        log_weights, means, factors = outputs
-        cholesky = self.cholesky @ torch.linalg.inv(factors).numpy()
+    def _density(self, network: DensityNetwork, linear: LinearDensity, view: View, seen: Seen) -> LatentDensity:
+        """A member's at one measurement."""
+        context = view.context(seen, self._width)
+        if isinstance(network, FlowNetwork):
+            coordinates, center = linear.one(seen)
+            return LatentFlow(coordinates, context[0], center, linear.cholesky, network)
+        start = torch.zeros(1, len(linear.scale))
+        log_weights, means, factors = (t[0].double() for t in network(torch.tensor(context).float(), start))
         weights = log_weights.exp().numpy()
-        moved = center + means.numpy() @ self.cholesky.T
-        return LatentMixture(coordinates, weights / weights.sum(), moved, cholesky)
-
-
-def _inner(probit: Coordinates, guess: FloatArray | None) -> FloatArray | None:
-    """Predictions of the cube in probit coordinates; those on or beyond a face as a little inside."""
-    return None if guess is None else probit.to_latent(np.clip(guess, _GUESS_FACE, 1.0 - _GUESS_FACE))
+        return linear.mixture(seen, weights / weights.sum(), means.numpy(), torch.linalg.inv(factors).numpy())

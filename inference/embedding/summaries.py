@@ -24,6 +24,11 @@ def probit(unit: Tensor, edge: float = FACE) -> Tensor:
     return z
 
 
+def picked(each: list[Tensor], choice: list[int]) -> Tensor:
+    """Of predictions ``(B, D)`` of several kinds, for each parameter those of the kind chosen for it."""
+    return torch.stack([each[i][:, j] for j, i in enumerate(choice)], dim=1)
+
+
 class BlockSummary:
     """One kind of rows: its principal components, and kernel regression of the parameters on them.
 
@@ -60,8 +65,7 @@ class BlockSummary:
             self.guess[::step, j] = self.fits[i][1].left_out[:, j]
 
     def _predict(self, white: Tensor) -> Tensor:
-        each = [fit.predict(white * scale) for scale, fit in self.fits]
-        return torch.stack([each[i][:, j] for j, i in enumerate(self.choice)], dim=1)
+        return picked([fit.predict(white * scale) for scale, fit in self.fits], self.choice)
 
     def __call__(self, rows: Tensor) -> tuple[Tensor, Tensor]:
         """New rows ``(B, F)`` to components ``(B, k)`` and regressions ``(B, D)``."""
@@ -97,8 +101,7 @@ class Summaries:
 
     def _combined(self, parts: list[tuple[Tensor, Tensor]]) -> tuple[Tensor, Tensor]:
         guesses = [probit(guess, _GUESS_EDGE) for _, guess in parts]
-        best = torch.stack([guesses[b][:, j] for j, b in enumerate(self.choice)], dim=1)
-        return torch.cat([*guesses, parts[0][0][:, : self.shown]], dim=1), best
+        return torch.cat([*guesses, parts[0][0][:, : self.shown]], dim=1), picked(guesses, self.choice)
 
     def __call__(self, blocks: list[Tensor]) -> tuple[Tensor, Tensor]:
         """New rows of each kind to features and first guesses ``(B, D)``."""

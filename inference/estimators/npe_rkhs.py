@@ -29,8 +29,8 @@ class NPERKHS(TrainedEstimator):
       (:class:`~..density.coordinates.Coordinates`). Where the posterior is linear and Gaussian, that is all there is
       to learn.
     - Ensembles of mixture density networks and of neural spline flows learn what is left over, each member stopped
-      early on draws that it leaves out; stacking on those draws weighs them, the linear and the flat density
-      (:class:`~..density.stacked.StackedDensity`).
+      early on draws that it leaves out, and from which nothing that it reads was made; stacking on those draws weighs
+      them, the linear and the flat density (:class:`~..density.stacked.StackedDensity`).
 
     The posterior's support and normalisation are exact. Training takes seconds for a thousand draws. A measurement
     outside the range of the draws is pulled to its border: check a posterior against the measurement before
@@ -64,14 +64,14 @@ class NPERKHS(TrainedEstimator):
 
     def _train(self, x: list[FloatArray], flags: tuple[bool, ...], draws: Draws, generator: torch.Generator) -> Answer:
         s: Settings = self.settings
-        reading = Reading(
-            x, flags, draws, s.time_plan if s.time_epochs else None, s.principal, s.shown, generator, self._device
-        )
-        shape = Shape(self._heads, s.members, s.held_out, s.coordinates, s.components, s.hidden, s.transforms, s.bins)
-        unit, weights = draws.unit.numpy(), draws.weights.numpy()
-        density = StackedDensity(
-            reading.training, reading.shown, unit, weights, shape, s.schedule(len(unit)), generator, self._device
-        )
+        plan = s.time_plan if s.time_epochs else None
+        reading = Reading(x, flags, draws, plan, s.principal, generator, self._device)
+        shape = Shape(
+            self._heads, s.members, s.held_out, s.coordinates, s.components, s.hidden, s.transforms, s.bins,
+            s.principal, s.shown,
+        )  # fmt: skip
+        schedule = s.schedule(len(draws.unit))
+        density = StackedDensity(reading.training, draws, shape, schedule, generator, self._device)
         self._weights = density.weights
         return lambda batch: density.posterior(reading(batch))
 

@@ -190,7 +190,8 @@ def fit_ensemble(z: torch.Tensor, context: torch.Tensor, make: Callable[[], Flow
         members = [make() for _ in range(3)]
     held = left_out(len(z), 3, 0.1, generator)
     schedule = Schedule(1e-2, 1e-3, 90, 12, 8)
-    return train_ensemble(members, [context], z, torch.ones(len(z)), held, schedule, generator, torch.device("cpu"))
+    inputs, targets, weights = [context.expand(3, -1, -1)], z.expand(3, -1, -1), torch.ones(len(z))
+    return train_ensemble(members, inputs, targets, weights, held, schedule, generator, torch.device("cpu"))
 
 
 def test_an_ensemble_learns_a_scale_that_depends_on_the_context() -> None:
