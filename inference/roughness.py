@@ -68,7 +68,7 @@ class Roughness:
 
 
 def roughness(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, recordings: Sequence[str]) -> Roughness:
-    """Look at neighbours of a point: what they leave of a parabola, a smooth model follows, however much it bends.
+    """Look at neighbours of a point: a smooth model leaves nothing of a parabola through them, however much it bends.
 
     Args:
         pool: where rollouts run.

@@ -1,12 +1,13 @@
-"""What was named, fitted to the end: what a fit in a side valley leaves is no second effect."""
+"""What may be named, fitted to the end: what a fit in a side valley leaves is no second effect, nor a rival's merit."""
 
 from dataclasses import replace
 
 import numpy as np
 from scipy import stats
 
-from .candidate import best_starts
-from .stage import MORE_EVALUATIONS, Stage
+from .candidate import Candidate, best_starts
+from .stage import MORE_EVALUATIONS, NEARLY, Stage
+from .verdict import EXPLAINS, Evidence, decide
 from .work import Work
 
 #: Points of the parameters' prior that are looked at (a power of two), and how many of the best are fitted from.
@@ -14,12 +15,32 @@ PLACES, RESTARTS = 16, 2
 
 
 def settled(work: Work, stage: Stage) -> Stage:
-    """The stage with what it named polished further, and where that leaves a misfit, from other parameters too.
+    """The stage with its leader fitted further, and its rivals too unless the leader leaves nothing but noise.
 
-    A missing effect drives the parameters far away, and with it in the model they start from there. Only once the
-    verdict stands: of all candidates the leader alone would have it easier than its rivals.
+    A missing effect drives the parameters far away, and with it in the model the fits start from there; the right
+    effect may rest in a side valley and a look-alike not.
     """
-    c = stage.chosen
+    leader = stage.evidence.nearest if stage.evidence.candidates else None
+    if leader is None or not leader.refitted or stage.evidence.explained(leader) < EXPLAINS:
+        return stage
+    evidence = _with(stage.evidence, _fitted_on(work, stage, leader))
+    reached = evidence.explained(evidence.nearest)
+    if evidence.left(evidence.nearest) > 0.0:
+        near = [c for c in evidence.candidates if c.refitted and c.name != leader.name]
+        for c in sorted(near, key=lambda c: c.rank):
+            if evidence.explained(c) >= NEARLY * reached:
+                evidence = _with(evidence, _fitted_on(work, stage, c))
+    best, plain = evidence.nearest, stage.plain
+    if best.rss < leader.rss:  # a better start must not pass for an effect
+        again = work.polished(stage.effects, best.fit.unit[: best.base], MORE_EVALUATIONS)
+        if again.rss < plain.rss:
+            plain = again
+            evidence = work.evidence(stage.effects, plain, evidence.candidates)
+    return replace(stage, plain=plain, evidence=evidence, decision=decide(evidence))
+
+
+def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
+    """Polished further, and where that leaves a misfit, from other parameters too."""
     effects = (*stage.effects, c.name)
     if stage.evidence.left(c) > 0.0 and work.may_go_on():
         fit = work.polished(effects, c.fit.unit, MORE_EVALUATIONS)
@@ -31,6 +52,8 @@ def settled(work: Work, stage: Stage) -> Stage:
         starts = best_starts(work.objective(effects), points)[:RESTARTS]
         fits = [c.fit, *(work.polished(effects, unit, MORE_EVALUATIONS) for unit, _ in starts)]
         c = replace(c, fit=min(fits, key=lambda p: p.rss))
-    better = work.judged(c)
-    candidates = tuple(better if other.name == c.name else other for other in stage.evidence.candidates)
-    return replace(stage, evidence=replace(stage.evidence, candidates=candidates))
+    return work.judged(c)
+
+
+def _with(evidence: Evidence, changed: Candidate) -> Evidence:
+    return replace(evidence, candidates=tuple(changed if c.name == changed.name else c for c in evidence.candidates))

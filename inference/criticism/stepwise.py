@@ -44,6 +44,7 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     work.limit = int(FIRST_SHARE * total)
     first = run_stage(work, (), names, start)
     work.limit = total
+    first = settled(work, first)
     verdict = first.decision.verdict
     if verdict == "none":
         return _pair(work, names, first) or Findings("none", (), first, first, _nearest(first))
@@ -51,7 +52,6 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
         return Findings("tied", first.decision.effects, first, first, first.chosen)
     if verdict != "named":
         return Findings(verdict, (), first, first, _nearest(first))
-    first = settled(work, first)
     return _forward(work, names, Findings("named", first.decision.effects, first, first, first.chosen))
 
 
@@ -61,14 +61,13 @@ def _forward(work: Work, names: list[str], found: Findings) -> Findings:
         rest = [n for n in names if n not in found.effects]
         if not rest:
             break
-        stage = run_stage(work, found.effects, rest, found.after.fit.unit)
+        stage = settled(work, run_stage(work, found.effects, rest, found.after.fit.unit))
         # the same model, fitted to the end, and its numerics looked at where it fits
         found = replace(found, after=work.judged(replace(found.after, fit=stage.plain)))
         if stage.decision.verdict == "tied":
             return replace(found, further=stage.decision.effects)
         if stage.decision.verdict != "named":
             break
-        stage = settled(work, stage)
         effects = (*found.effects, stage.chosen.name)
         found = _without_idle(work, replace(found, effects=effects, last=stage, after=stage.chosen))
         if len(found.effects) < len(effects):
@@ -84,9 +83,7 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
         rest = [n for n in names if n != lead.name]
         if not work.may_go_on() or not rest:
             return None
-        stage = run_stage(work, (lead.name,), rest, lead.fit.unit)
-        if stage.decision.verdict == "named":
-            stage = settled(work, stage)
+        stage = settled(work, run_stage(work, (lead.name,), rest, lead.fit.unit))
         if stage.decision.verdict == "named" and work.jointly(first.plain, stage.chosen).accounted(stage.chosen):
             pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
             return _forward(work, names, _without_idle(work, pair))

@@ -1,0 +1,75 @@
+"""A right effect that rests in a side valley is not overtaken by a look-alike."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_verdict import COUNT, candidate, evidence
+
+from muslin.core.arrays import FloatArray
+from muslin.inference.criticism.candidate import Candidate
+from muslin.inference.criticism.settle import settled
+from muslin.inference.criticism.stage import Stage
+from muslin.inference.criticism.verdict import Evidence, decide
+from muslin.inference.polish import Polished
+
+
+class Bench:
+    """Stands in for rollouts: from other parameters a fit comes down to ``floors`` [noise variances]."""
+
+    def __init__(self, floors: dict[str, float], budget: bool = True) -> None:
+        self.floors, self.budget, self.asked = floors, budget, list[str]()
+        self.study = SimpleNamespace(config=SimpleNamespace(study=SimpleNamespace(seed=1)))
+
+    def may_go_on(self) -> bool:
+        return self.budget
+
+    def polished(self, effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
+        name = effects[-1] if effects else "plain"
+        self.asked.append(name)
+        rss = self.floors[name] if unit[0] != 0.5 else 9 * COUNT  # 0.5: where the first fit rests
+        return replace(candidate("x", rss).fit, unit=unit)
+
+    def objective(self, effects: tuple[str, ...]) -> SimpleNamespace:
+        return SimpleNamespace(many=lambda points: [np.ones(3) for _ in points])
+
+    def judged(self, c: Candidate) -> Candidate:
+        return c
+
+    def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
+        return evidence(plain.rss, *candidates)
+
+
+def stage(*candidates: Candidate) -> Stage:
+    e = evidence(9 * COUNT, *candidates)
+    return Stage((), candidate("x", 9 * COUNT).fit, {}, e, decide(e))
+
+
+def test_the_right_effect_overtakes_a_look_alike() -> None:
+    before = stage(candidate("latency", 1.4 * COUNT), candidate("lag", 1.6 * COUNT))
+    assert before.decision.effects == ("latency",)
+    bench = Bench({"latency": 1.4 * COUNT, "lag": COUNT, "plain": 9 * COUNT})
+    after = settled(bench, before)  # type: ignore[arg-type]
+    assert (after.decision.verdict, after.decision.effects) == ("named", ("lag",))
+    assert after.evidence.left(after.chosen) == 0.0
+
+
+def test_rivals_are_left_alone_where_the_leader_leaves_noise() -> None:
+    bench = Bench({"drag": COUNT, "plain": 9 * COUNT})
+    after = settled(bench, stage(candidate("drag", 1.5 * COUNT), candidate("lag", 1.6 * COUNT)))  # type: ignore[arg-type]
+    assert after.decision.effects == ("drag",) and "lag" not in bench.asked
+    assert after.chosen.rss == pytest.approx(COUNT)
+
+
+def test_a_better_start_does_not_pass_for_an_effect() -> None:
+    bench = Bench({"drag": COUNT, "plain": COUNT})  # the model as it is comes down as far from there
+    assert settled(bench, stage(candidate("drag", 3 * COUNT))).decision.verdict == "no-misfit"  # type: ignore[arg-type]
+
+
+def test_nothing_is_done_without_a_budget_or_a_refit() -> None:
+    empty = Bench({}, budget=False)
+    assert settled(empty, stage(candidate("drag", 2 * COUNT))).evidence.candidates[0].rss == pytest.approx(2 * COUNT)  # type: ignore[arg-type]
+    seen = stage(replace(candidate("drag", 2 * COUNT), refitted=False))
+    assert settled(Bench({}), seen) is seen  # type: ignore[arg-type]
