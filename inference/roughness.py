@@ -19,7 +19,7 @@ from .discrepancy import LEAST_STEP, MOST_STEP, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, by_residual
 
-#: Places along a line through the unit cube, the middle one first, then neighbours, then a line in large steps.
+#: Places along the diagonal of the unit cube, the middle one first, then its nearest, then neighbours farther off.
 _PLACES = np.array([0.0, -LEAST_STEP, LEAST_STEP, -2 * MOST_STEP, -MOST_STEP, MOST_STEP, 2 * MOST_STEP])
 _LINE = [3, 4, 0, 5, 6]
 
@@ -31,7 +31,7 @@ class Roughness:
     Args:
         sd: standard deviation of what no fit can follow [m or px].
         nearest: the same told by the nearest neighbours alone.
-        bend: second derivative along the line [m or px].
+        bend: second derivative along the diagonal [m or px].
     """
 
     sd: Mapping[str, FloatArray]
@@ -75,9 +75,8 @@ def roughness(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, rec
         space, unit: parameters, and where to look in their unit cube ``(D,)``.
         recordings: names; one that cannot be simulated there is left out.
     """
-    line = np.random.default_rng(59).choice([-1.0, 1.0], size=len(unit))
     span = np.abs(_PLACES).max()
-    points = np.clip(unit, span, 1.0 - span) + _PLACES[:, None] * line
+    points = np.clip(unit, span, 1.0 - span) + _PLACES[:, None]
     powers = np.vander(_PLACES[_LINE] / MOST_STEP, 3)
     solve = np.linalg.pinv(powers)
     tasks = [Task(space.as_dict(space.from_unit(p)), name) for name in recordings for p in points]

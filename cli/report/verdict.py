@@ -95,7 +95,7 @@ def _diagnosed(found: Findings) -> Verdict:
         "no-misfit": f"Nothing is seen to be missing: the {e['on']} error is {before}, {floor}.",
     }.get(str(result["verdict"]), f"Verdict: {result['verdict']}.")
     if result.get("unfinished"):
-        text = f"The error is {before} at {floor}; the budget ended before any candidate was refitted."
+        text = f"The error is {before} at {floor}; the budget ended before what promises most was refitted."
     tone = {"none": "bad", "no-misfit": "good"}.get(str(result["verdict"]), "open")
     return Verdict(words(str(result["verdict"])), tone, text, detail)
 

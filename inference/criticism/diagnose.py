@@ -41,7 +41,8 @@ def diagnose(study: Study) -> Diagnosis:
         # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain
         started = work.space(()), _fitted(study)
         pair = BeforeAfter(work, started, (found.after.space, found.after.fit.unit))
-        joint = work.jointly(found.first.plain, found.after)
+        plain = found.first.plain
+        joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
         found = replace(found, after=joint.nearest)
         count = work.count
     result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
@@ -143,8 +144,7 @@ def _result(
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,
         "budget_spent": work.cut_short,
-        # it ended before anything could be ruled out
-        "unfinished": found.verdict == "cannot-tell" and work.cut_short and not any(c.refitted for c in e.candidates),
+        "unfinished": found.first.decision.unfinished,
         "seconds": seconds,
         "seed": study.config.study.seed,
     }

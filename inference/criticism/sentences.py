@@ -83,8 +83,8 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
     if result["unfinished"]:
         return (
             f"Cannot tell yet: the model misses something, {ratio:.1f} times the noise, but the budget ended after "
-            f"{result['simulations']} simulations, before any candidate was refitted; the ranking is what a first look "
-            "promises."
+            f"{result['simulations']} simulations, before what promises most was refitted; the ranking is that of a "
+            "rough search."
         )
     return (
         "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were missing."

@@ -7,7 +7,7 @@ from scipy import stats
 
 from .candidate import Candidate, best_starts
 from .stage import MORE_EVALUATIONS, NEARLY, Stage
-from .verdict import EXPLAINS, Evidence, decide
+from .verdict import EXPLAINS, Evidence, decide, objection
 from .work import Work
 
 #: Points of the parameters' prior that are looked at (a power of two), and how many of the best are fitted from.
@@ -20,8 +20,10 @@ def settled(work: Work, stage: Stage) -> Stage:
     A missing effect drives the parameters far away, and with it in the model the fits start from there; the right
     effect may rest in a side valley and a look-alike not.
     """
-    leader = stage.evidence.nearest if stage.evidence.candidates else None
-    if leader is None or not leader.refitted or stage.evidence.explained(leader) < EXPLAINS:
+    if not any(c.refitted for c in stage.evidence.candidates):
+        return stage
+    leader = min(_passing(stage.evidence) or stage.evidence.candidates, key=lambda c: c.rank)
+    if stage.evidence.explained(leader) < EXPLAINS:
         return stage
     evidence = _with(stage.evidence, _fitted_on(work, stage, leader))
     reached = evidence.explained(evidence.nearest)
@@ -31,7 +33,7 @@ def settled(work: Work, stage: Stage) -> Stage:
             if evidence.explained(c) >= NEARLY * reached:
                 evidence = _with(evidence, _fitted_on(work, stage, c))
     best, plain = evidence.nearest, stage.plain
-    if best.rss < leader.rss:  # a better start must not pass for an effect
+    if best.rss < stage.evidence.nearest.rss:  # a better start must not pass for an effect
         again = work.polished(stage.effects, best.fit.unit[: best.base], MORE_EVALUATIONS)
         if again.rss < plain.rss:
             plain = again
@@ -42,9 +44,9 @@ def settled(work: Work, stage: Stage) -> Stage:
 def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
     """Polished further, and where that leaves a misfit, from other parameters too."""
     effects = (*stage.effects, c.name)
-    if stage.evidence.left(c) > 0.0 and work.may_go_on():
+    if (stage.evidence.left(c) > 0.0 or not c.refitted) and work.may_go_on():
         fit = work.polished(effects, c.fit.unit, MORE_EVALUATIONS)
-        c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss))
+        c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True)
     if stage.evidence.left(c) > 0.0 and work.may_go_on():
         rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
         points = np.repeat(c.fit.unit[None], PLACES, axis=0)
@@ -53,6 +55,10 @@ def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
         fits = [c.fit, *(work.polished(effects, unit, MORE_EVALUATIONS) for unit, _ in starts)]
         c = replace(c, fit=min(fits, key=lambda p: p.rss))
     return work.judged(c)
+
+
+def _passing(evidence: Evidence) -> list[Candidate]:
+    return [c for c in evidence.candidates if objection(evidence, c) is None]
 
 
 def _with(evidence: Evidence, changed: Candidate) -> Evidence:

@@ -84,7 +84,7 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
         if not work.may_go_on() or not rest:
             return None
         stage = settled(work, run_stage(work, (lead.name,), rest, lead.fit.unit))
-        if stage.decision.verdict == "named" and work.jointly(first.plain, stage.chosen).accounted(stage.chosen):
+        if stage.decision.verdict == "named" and work.jointly(stage.chosen, first.plain).accounted(stage.chosen):
             pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
             return _forward(work, names, _without_idle(work, pair))
     return None

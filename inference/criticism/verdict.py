@@ -105,10 +105,11 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Decision:
-    """A verdict and the effects that it is about, best first."""
+    """A verdict and the effects that it is about, best first; unfinished if what promises most was not refitted."""
 
     verdict: Verdict
     effects: tuple[str, ...]
+    unfinished: bool = False
 
 
 def has_misfit(e: Evidence) -> bool:
@@ -141,8 +142,8 @@ def decide(e: Evidence) -> Decision:
     if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
         seen = sum(c.visible for c in e.candidates)
         return Decision("no-misfit" if 2 * seen >= len(e.candidates) else "cannot-tell", ())
-    if not any(c.refitted for c in passing or e.candidates):  # then nothing can be ruled out
-        return Decision("cannot-tell", ())
+    if not any(c.refitted for c in (passing[:1] or e.candidates)):  # nothing is named nor ruled out unfitted
+        return Decision("cannot-tell", (), unfinished=True)
     if not passing:
         return Decision("none", ())
     best = passing[0]

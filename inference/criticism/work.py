@@ -104,11 +104,16 @@ class Work:
             unsure=self.fit.noise.information * self.discrepancy.left_to_chance(self.problem.fit_on),
         )
 
-    def jointly(self, plain: Polished, after: Candidate) -> Evidence:
-        """The model as it was beside all that was found, both whitened by the numerics as last seen."""
+    def jointly(self, after: Candidate, *plain: Polished) -> Evidence:
+        """The model as it was beside all that was found, both whitened by the numerics as last seen.
+
+        Args:
+            after: with all that was found.
+            plain: fits of the model as it was, of which the nearest counts.
+        """
         effects = tuple(dict.fromkeys(n.split(".", 1)[0] for n in after.space.names if "." in n))
         later = replace(after, fit=self._again(effects, after.fit))
-        return self.evidence((), self._again((), plain), [later])
+        return self.evidence((), min((self._again((), fit) for fit in plain), key=lambda p: p.rss), [later])
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
         """The same point with residuals that are whitened as they are now."""

@@ -4,6 +4,7 @@ import numpy as np
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, polish, polish_from
 from muslin.inference.residuals import Offsets
@@ -46,6 +47,21 @@ def test_another_start_is_tried_where_the_first_leaves_a_misfit() -> None:
     assert stuck.rss > 1.5 * stuck.count
     best = polish_from(TwoValleys(2.0), starts)
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
+
+
+def test_derivatives_are_taken_at_the_step_that_is_told() -> None:
+    class Noted(Linear):
+        asked: FloatArray
+
+        def many(self, units: FloatArray) -> list[FloatArray | None]:
+            self.asked = units
+            return super().many(units)
+
+    objective, unit = Noted(2.0), np.array([0.5, 1.0])  # a step up would leave the cube
+    for step in (1e-4, 2e-3):
+        objective.discrepancy = Discrepancy(step=step)
+        np.testing.assert_allclose(objective.jacobian(unit), objective.matrix, rtol=1e-6)
+        np.testing.assert_allclose(objective.asked - unit, np.diag([step, -step]), atol=1e-12)
 
 
 def test_a_neighbour_that_fails_does_not_pass_for_certainty() -> None:

@@ -12,7 +12,7 @@ from muslin.core.arrays import FloatArray
 from muslin.inference.criticism.candidate import Candidate
 from muslin.inference.criticism.settle import settled
 from muslin.inference.criticism.stage import Stage
-from muslin.inference.criticism.verdict import Evidence, decide
+from muslin.inference.criticism.verdict import Decision, Evidence, decide
 from muslin.inference.polish import Polished
 
 
@@ -66,6 +66,15 @@ def test_rivals_are_left_alone_where_the_leader_leaves_noise() -> None:
 def test_a_better_start_does_not_pass_for_an_effect() -> None:
     bench = Bench({"drag": COUNT, "plain": COUNT})  # the model as it is comes down as far from there
     assert settled(bench, stage(candidate("drag", 3 * COUNT))).decision.verdict == "no-misfit"  # type: ignore[arg-type]
+
+
+def test_what_passes_without_a_refit_is_refitted_before_it_is_named() -> None:
+    """The two that were refitted do harm on held-out motions."""
+    third = replace(candidate("drag", 2.2 * COUNT), refitted=False)
+    before = stage(candidate("lag", 2.0 * COUNT, held_out=0.02), third)
+    assert before.decision == Decision("cannot-tell", (), unfinished=True)
+    after = settled(Bench({"drag": COUNT, "plain": 9 * COUNT}), before)  # type: ignore[arg-type]
+    assert (after.decision.verdict, after.decision.effects) == ("named", ("drag",)) and after.chosen.refitted
 
 
 def test_nothing_is_done_without_a_budget_or_a_refit() -> None:

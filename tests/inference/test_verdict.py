@@ -66,8 +66,10 @@ def test_none_when_nothing_explains_half() -> None:
 
 def test_nothing_is_ruled_out_that_was_not_refitted() -> None:
     looked_at = [replace(candidate(n, 9 * COUNT), refitted=False) for n in ("drag", "wind")]
-    assert decide(evidence(9 * COUNT, *looked_at)).verdict == "cannot-tell"
+    assert decide(evidence(9 * COUNT, *looked_at)) == Decision("cannot-tell", (), unfinished=True)
     assert decide(evidence(9 * COUNT, looked_at[0], candidate("wind", 9 * COUNT))).verdict == "none"
+    promising = replace(candidate("drag", 1.02 * COUNT), refitted=False)
+    assert decide(evidence(9 * COUNT, promising, candidate("wind", 9 * COUNT))).unfinished
 
 
 def test_not_named_when_the_held_out_motion_gets_worse() -> None:
