@@ -52,6 +52,11 @@ class PointSeries:
             raise InputError(f"unit must be 'm' or 'px', not {self.unit!r}")
         if not np.isfinite(p).any():
             raise InputError("every point is NaN in every frame; check the columns and the marker labels")
+        if not self.correspondence and not self.valid.any():
+            raise InputError(
+                "no point has all its coordinates, which points without correspondence are compared by; "
+                "a coordinate that was not measured may only be left out of points that keep their order"
+            )
 
     @property
     def valid(self) -> BoolArray:

@@ -112,6 +112,14 @@ def test_measurements_that_cannot_be() -> None:
         Measurement((take(),))["z"]
 
 
+def test_points_without_correspondence_need_every_coordinate() -> None:
+    flat = np.ones((3, 5, 3))
+    flat[:, :, 1] = np.nan
+    PointSeries(np.arange(3.0), flat)
+    with pytest.raises(InputError, match="no point has all its coordinates"):
+        PointSeries(np.arange(3.0), flat, correspondence=False)
+
+
 def test_a_damaged_store_is_told(tmp_path: Path) -> None:
     whole = tmp_path / "m.zarr"
     save_measurement(Measurement((take(gripper=Motion.still()),)), whole)
