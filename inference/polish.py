@@ -1,10 +1,9 @@
 """Least squares from a good start: the best parameters and how far the data let them move."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from ..core.arrays import FloatArray
 from ..core.measurement import Recording
@@ -14,12 +13,18 @@ from ..core.study import SimulationPool, Task
 from .discrepancy import NONE, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, failed, residual
+from .secants import CHANCE, LARGEST, Found, search
 
 #: Least squares starts from another place while it leaves this times what noise leaves, this often at most, from
-#: starts at least so far apart in some coordinate of the unit cube.
+#: starts at least so far from places known in some coordinate of the unit cube.
 MISFIT, STARTS, APART = 1.5, 4, 0.1
-#: Evaluations from each of these before they are given up.
-FEW_EVALUATIONS = 4
+#: Evaluations of a search, and from each of these before they are given up.
+EVALUATIONS, FEW_EVALUATIONS = 40, 10
+#: A search ends where it promises less in -2 log likelihood. Where it leaves this times what noise leaves it looks
+#: around once more, from a kink perhaps, until that gains less than this share.
+TOLD_APART, KINKED, LITTLE = 0.3, 1.05, 0.01
+#: How far derivatives are trusted at first, and the smallest steps before they are taken.
+NEARBY, COARSE = 0.02, 0.002
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,13 +116,17 @@ class Objective:
             self._last = (unit.copy(), row)
         return self._last[1]
 
-    def jacobian(self, unit: FloatArray) -> FloatArray:
+    def jacobian(self, unit: FloatArray, white: FloatArray | None = None) -> FloatArray:
         """Derivative of the white residuals ``(N, D)`` by one-sided differences that stay in the cube.
 
         Where the neighbour cannot be simulated the other side is taken; where neither can, the
         derivative is unknown and zero, which leaves the prior's uncertainty to that parameter.
+
+        Args:
+            unit: where ``(D,)``.
+            white: what :meth:`one` is there, if known.
         """
-        base = self.one(unit)
+        base = self.one(unit) if white is None else white
         steps = np.where(unit + self.discrepancy.step <= 1.0, 1.0, -1.0) * self.discrepancy.step
         columns = np.zeros((len(base), len(unit)))
         missing = np.arange(len(unit))
@@ -133,74 +142,70 @@ class Objective:
         return columns
 
 
-class _Secants:
-    """Derivatives by differences once, and then from where the search goes (Broyden, 1965)."""
-
-    def __init__(self, objective: Objective, known: FloatArray | None) -> None:
-        self._objective, self._jacobian = objective, known
-        self._at: tuple[FloatArray, FloatArray] | None = None
-
-    def __call__(self, unit: FloatArray) -> FloatArray:
-        white = self._objective.one(unit)
-        if self._jacobian is None:
-            self._jacobian = self._objective.jacobian(unit)
-        elif self._at is not None:
-            step = unit - self._at[0]
-            missed = white - self._at[1] - self._jacobian @ step
-            self._jacobian = self._jacobian + np.outer(missed, step) / max(float(step @ step), 1e-12)
-        self._at = (unit.copy(), white)
-        return self._jacobian
-
-
 def polish(
     objective: Objective,
     start: FloatArray,
-    evaluations: int = 12,
+    evaluations: int = EVALUATIONS,
     *,
     known: FloatArray | None = None,
     roughly: bool = False,
 ) -> Polished:
-    """Bounded least squares (trust region reflective) from ``start`` in the unit cube.
+    """Bounded least squares from ``start`` in the unit cube; see :mod:`.secants`.
+
+    Where it comes to rest it goes on by derivatives, and while it leaves a misfit it looks around farther off: small
+    differences see a way down a narrow valley that wide ones do not, and wide ones a way out of a kink.
 
     Args:
         objective: to make least.
         start: ``(D,)``.
-        evaluations: at most, derivatives not counted.
-        known: Jacobian at ``start`` ``(N, D)``, if there is one already; only with ``roughly``.
-        roughly: take no more derivatives by differences than at the start, for an unfinished search: a fraction of
-            the rollouts, and a curvature that is not to be relied on.
+        evaluations: at most, but for the first D and the derivatives at the end.
+        known: Jacobian at ``start`` ``(N, D)``, if there is one already.
+        roughly: for an unfinished search: it comes to rest once, and its curvature is not to be relied on.
     """
-    result = least_squares(
-        objective.one,
-        np.clip(start, 1e-4, 1 - 1e-4),
-        jac=_Secants(objective, known) if roughly else objective.jacobian,
-        bounds=(0.0, 1.0),
-        x_scale=0.1,
-        ftol=1e-4,
-        xtol=1e-4,
-        max_nfev=evaluations,
-    )
-    jacobian, white = np.asarray(result.jac, float), np.asarray(result.fun, float)
+    start = np.asarray(start, float)
+    white = objective.one(start)
+    count = objective.count(white)
+    least, enough = objective.discrepancy.step, TOLD_APART / count
+    coarse = max(least, COARSE)
+    at = Found(start, white, np.zeros((len(white), len(start))) if known is None else known)
+    best, used = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
+    jacobian, moved = best.jacobian, not roughly
+    while moved:
+        jacobian, moved = objective.jacobian(best.unit, best.white), False
+        nearby = replace(best, jacobian=jacobian)
+        tries = [(nearby, CHANCE * enough, NEARBY, least)]
+        if best.rss > KINKED * count:
+            tries.insert(0, (best, LITTLE, LARGEST, coarse))
+        for begin, wanted, radius, smallest in tries:
+            if used < evaluations and not moved:
+                found, more = search(
+                    objective.many, begin, evaluations - used,
+                    enough=enough, least=smallest, radius=radius, known=begin is nearby,
+                )  # fmt: skip
+                used += more + len(start)
+                moved = found.rss < (1.0 - wanted) * best.rss
+                best = found if moved else best
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
     information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
     covariance = np.asarray(np.linalg.inv(information), float)
-    return Polished(np.asarray(result.x, float), covariance, jacobian, white, objective.count(white))
+    return Polished(best.unit, covariance, jacobian, best.white, count)
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:
     """The best of least squares from the first of ``starts (N, D)``, and while it leaves a misfit, from others.
 
     An object that may fall one way or another (a rope on a table, a fold) has valleys that no descent leaves. The
-    others are the next that are not near one that was tried.
+    others are the next that are not near one that was tried, nor near where that led.
     """
-    tried = [starts[0]]
     best = polish(objective, starts[0])
+    tried, known = 1, [starts[0], best.unit]
     for start in starts[1:]:
-        if best.rss < MISFIT * best.count or len(tried) == STARTS:
+        if best.rss < MISFIT * best.count or tried == STARTS:
             break
-        if min(np.abs(start - t).max() for t in tried) > APART:
-            tried.append(start)
+        if min(np.abs(start - k).max() for k in known) > APART:
+            tried += 1
             other = polish(objective, start, FEW_EVALUATIONS)
+            known += [start, other.unit]
             if other.rss < best.rss:
                 best = min(other, polish(objective, other.unit), key=lambda p: p.rss)
     return best

@@ -160,10 +160,9 @@ def _serve(connection: Connection, file: str) -> None:
         connection.send(True)
         while True:
             try:
-                task = connection.recv()
-            except EOFError:
+                connection.send(simulate(problem, connection.recv()))
+            except (EOFError, BrokenPipeError):  # the parent has gone
                 return
-            connection.send(simulate(problem, task))
 
 
 def _die_with_parent(parent: int) -> None:

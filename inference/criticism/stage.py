@@ -11,8 +11,9 @@ from .linear import Look, least_square, look_at
 from .verdict import SIGNIFICANT, Decision, Evidence, decide, has_misfit
 from .work import Work
 
-#: Least-squares evaluations for a candidate that passed the screening, for a contender on top, and to the end.
-FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 10
+#: Least-squares evaluations for a candidate that passed the screening, for a contender on top, for the plain model at
+#: first, and to the end.
+FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, PLAIN_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 12, 40
 #: Points of every candidate in the first screening, beside where a linear model would go.
 FEW_POINTS = 3
 #: A response to the first look so much larger than the misfit is looked at on other scales.
@@ -53,7 +54,7 @@ def run_stage(work: Work, effects: tuple[str, ...], names: list[str], start: Flo
     """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``."""
     work.study.progress("refitting the model as it is", 0, 0)
     work.see_numerics(effects, start)
-    plain = work.polished(effects, start, CONTENDER_EVALUATIONS)
+    plain = work.polished(effects, start, PLAIN_EVALUATIONS)
     looks = {}
     for k, name in enumerate(names):
         work.study.progress(f"looking at {name}", k + 1, len(names))

@@ -78,8 +78,8 @@ class Work:
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """A least-squares fit of the model with ``effects``, of as many evaluations as the budget has left."""
         objective = self.objective(effects)
-        each = (1 + len(objective.space)) * len(self.problem.fit_on)
-        left = max(1, (self.limit - self.count) // each)
+        # it begins and ends with derivatives
+        left = max(1, (self.limit - self.count) // len(self.problem.fit_on) - 2 * len(objective.space))
         self.cut_short |= left < evaluations
         return polish(objective, start, min(evaluations, left))
 

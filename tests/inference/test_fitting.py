@@ -68,10 +68,11 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     measurement = small_measurement()
     whole = Study.load(write_study(tmp_path / "whole", measurement), workers=1).fit()
     path = write_study(tmp_path / "killed", measurement)
+    errors = tmp_path / "errors"
     process = subprocess.Popen(
         [sys.executable, "-m", "muslin.cli", "fit", str(path), "--workers", "1"],
         stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        stderr=errors.open("w"),
         cwd=tmp_path,
     )
     status = path.parent / "study.results.zarr/fit/draws/status/c"
@@ -91,6 +92,7 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     assert len(done) >= after
     for name, when in done.items():
         assert (status / name).stat().st_mtime_ns == when, f"draw {name} was simulated again"
+    assert "Traceback" not in errors.read_text(), "workers end quietly"
 
 
 def test_results_open_in_xarray_with_units(small_study: Study) -> None:

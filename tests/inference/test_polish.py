@@ -49,6 +49,22 @@ def test_another_start_is_tried_where_the_first_leaves_a_misfit() -> None:
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
 
 
+class Bent(Linear):
+    """A narrow valley along a parabola (Rosenbrock 1960), with numbers enough to be noise at the bottom."""
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        noise = np.random.default_rng(1).normal(size=40)
+        return [np.concatenate([[300.0 * (u[1] - u[0] ** 2), 30.0 * (0.8 - u[0])], noise]) for u in units]
+
+
+def test_it_comes_to_the_bottom_of_a_narrow_valley() -> None:
+    best = polish(Bent(2.0), np.array([0.1, 0.9]))
+    floor = float(np.sum(np.random.default_rng(1).normal(size=40) ** 2))
+    assert best.rss < floor + 0.3
+    truth = np.array([[-600 * 0.8, 300], [-30, 0]])
+    np.testing.assert_allclose(best.jacobian[:2], truth, rtol=0.05, atol=0.5)
+
+
 def test_derivatives_are_taken_at_the_step_that_is_told() -> None:
     class Noted(Linear):
         asked: FloatArray

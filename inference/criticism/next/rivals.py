@@ -15,7 +15,7 @@ from ...sequential.fitting import offsets_of
 from ...sequential.result import FitResult
 
 #: Least-squares evaluations for a model that has to be refitted.
-EVALUATIONS = 10
+EVALUATIONS = 40
 #: A typical strength of an effect that nobody has seen: this share of the prior range.
 TYPICAL = 0.25
 #: Steps in the unit cube are no shorter than this, or rounding in a rollout would show.

@@ -19,7 +19,7 @@ from .search import Guess
 #: Name of the effect.
 LAW = "law"
 #: Least-squares evaluations for every guess, and for those that lead.
-FIRST_EVALUATIONS, MORE_EVALUATIONS = 4, 10
+FIRST_EVALUATIONS, MORE_EVALUATIONS = 12, 40
 #: Coefficients nearer to zero than this are dropped [standard deviations].
 CLEAR = 3.0
 #: Most coefficients hold for any size; this one only says where others act, and is not dropped for being small.

@@ -23,7 +23,7 @@ RANGES = {"weak": (0.9, 2.4), "strong": (3.5, 8.0)}
 #: A share of the largest coefficients to start from, and how often the share is mended.
 FIRST_SHARE, TRIES = 0.3, 8
 #: Evaluations of the least-squares fit that calibrates the model.
-EVALUATIONS = 3
+EVALUATIONS = 12
 #: Lift above drag would push a sheet forward.
 _AT_MOST = {("air-drag", "lift_coefficient"): 0.4}
 

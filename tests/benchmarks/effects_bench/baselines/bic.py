@@ -7,7 +7,7 @@ from muslin.inference.polish import Polished, polish
 from .trial import Answer, Trial
 
 #: Least-squares evaluations of every refit, and where it starts in the range of each coefficient beside zero.
-EVALUATIONS, OFF_ZERO = 3, 0.1
+EVALUATIONS, OFF_ZERO = 12, 0.1
 
 
 def bic(trial: Trial) -> Answer:

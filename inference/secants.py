@@ -1,0 +1,171 @@
+"""Least squares without derivatives: steps of a linear model through the points that were tried.
+
+Rollouts of soft objects are not smooth: folds, contacts and slack threads put kinks into them, and derivatives by small
+differences are those of one facet. A model through points as far apart as the next step is long sees the slope of the
+valley instead, and needs one rollout a step rather than one a parameter. This is DFO-GN (Cartis and Roberts, A
+derivative-free Gauss-Newton method, 2019), with boxes as trust regions, because parameters are bounded by one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ..core.arrays import FloatArray
+
+#: White residuals ``(N,)`` at every row of ``(K, D)``; None where they cannot be had.
+Many = Callable[[FloatArray], Sequence[FloatArray | None]]
+
+#: Half the side of the box that the first model is trusted in, and of the largest.
+RADIUS, LARGEST = 0.1, 0.25
+#: A model is right where what it promised came true but for this share; it is good above and bad below these.
+RIGHT, GOOD, BAD = 0.1, 0.7, 0.1
+#: A fresh model that is wrong about less than this times what is enough is wrong by chance.
+CHANCE = 10.0
+#: Points so many radii from the best are too far for the model; a worse one is kept if this share of it is new.
+FAR, NEAR = 2.0, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The best point ``(D,)``, white residuals there ``(N,)``, and derivatives by secants ``(N, D)``."""
+
+    unit: FloatArray
+    white: FloatArray
+    jacobian: FloatArray
+
+    @property
+    def rss(self) -> float:
+        return float(self.white @ self.white)
+
+
+def search(
+    many: Many,
+    start: Found,
+    evaluations: int,
+    *,
+    enough: float,
+    least: float,
+    radius: float = RADIUS,
+    known: bool = False,
+) -> tuple[Found, int]:
+    """Least squares from ``start`` in the unit cube, and how many steps it took.
+
+    Args:
+        many: residuals.
+        start: its derivatives count only if ``known``; else D differences over ``radius`` are taken first.
+        evaluations: at most, after those.
+        enough: it ends where a model that was right promises less than this share of the residual sum of squares.
+        least: half the side of the smallest box.
+        radius: half the side of the first.
+        known: begin with the derivatives that are given.
+    """
+    model = _Model(many, start, radius, known)
+    used, right = 0, False
+    while used < evaluations and radius >= least:
+        step, gain = model.step(radius)
+        size = float(np.abs(step).max())
+        if gain < enough * model.rss or size < least:
+            if right:
+                break
+            if model.renew(radius):  # a model that promises nothing may be a poor one
+                used += 1
+            else:
+                radius /= 4.0
+            continue
+        came_true = model.tried(step, radius) / gain
+        used += 1
+        right = abs(came_true - 1.0) < RIGHT
+        if came_true >= GOOD:
+            radius = min(max(2.0 * size, radius / 4.0), LARGEST)
+        elif came_true >= BAD:
+            radius = max(size, radius / 4.0)
+        elif used < evaluations and model.renew(radius):
+            used += 1
+        elif gain < CHANCE * enough * model.rss:
+            break
+        else:
+            radius = min(radius / 2.0, max(size, radius / 4.0))
+    return model.found, used
+
+
+class _Model:
+    """The linear model through the best point and D others."""
+
+    def __init__(self, many: Many, start: Found, radius: float, known: bool) -> None:
+        self._many, self.unit, self.white = many, start.unit, start.white
+        inside = np.where(start.unit + radius <= 1.0, radius, -radius)
+        self.points = start.unit + np.diag(inside)
+        if known:
+            self.whites = start.white + (self.points - start.unit) @ start.jacobian.T
+            return
+        rows = list(many(self.points))
+        for k in [k for k, row in enumerate(rows) if row is None]:  # the other side may be simulated, or nearer
+            self.points[k, k] = np.clip(start.unit[k] - inside[k] / 4.0, 0.0, 1.0)
+            rows[k] = many(self.points[k : k + 1])[0]
+        self.whites = np.stack([self._or_flat(row) for row in rows])
+
+    @property
+    def rss(self) -> float:
+        return float(self.white @ self.white)
+
+    @property
+    def found(self) -> Found:
+        slopes = self._coordinates() @ (self.whites - self.white)
+        return Found(self.unit, self.white, np.asarray(slopes.T))
+
+    def step(self, radius: float) -> tuple[FloatArray, float]:
+        """Where the residuals of the model are least within the box and the cube ``(D,)``, and how much it promises."""
+        jacobian = self.found.jacobian
+        basis, triangle = np.linalg.qr(jacobian)
+        low, high = np.maximum(-radius, -self.unit), np.minimum(radius, 1.0 - self.unit)
+        step = np.clip(lsq_linear(triangle, -basis.T @ self.white, (low, high), method="bvls").x, low, high)
+        there = self.white + jacobian @ step
+        return step, self.rss - float(there @ there)
+
+    def tried(self, step: FloatArray, radius: float) -> float:
+        """Simulate there, keep it if it is better or tells more than a point that is kept, and return what it gains."""
+        new = self.unit + step
+        row = self._many(new[None])[0]
+        if row is None:
+            return -np.inf
+        gain = self.rss - float(row @ row)
+        center = new if gain > 0.0 else self.unit
+        share = np.abs(self._coordinates().T @ step)  # of each difference in the step
+        far = np.maximum(1.0, (np.abs(self.points - center).max(axis=1) / radius) ** 2)
+        k = int(np.argmax(share * far))
+        if gain > 0.0:
+            self._keep(k, self.unit, self.white)
+            self.unit, self.white = new, row
+        elif share[k] > NEAR:
+            self._keep(k, new, row)
+        return gain
+
+    def renew(self, radius: float) -> bool:
+        """Put a point within the box in place of the farthest; False if none is far."""
+        away = np.abs(self.points - self.unit).max(axis=1)
+        k = int(np.argmax(away))
+        if away[k] <= FAR * radius:
+            return False
+        gradient = self._coordinates()[:, k]
+        low, high = np.maximum(self.unit - radius, 0.0), np.minimum(self.unit + radius, 1.0)
+        corners = np.where(gradient > 0, high, low), np.where(gradient > 0, low, high)
+        new = max(corners, key=lambda c: abs(float(gradient @ (c - self.unit))))
+        row = self._or_flat(self._many(new[None])[0])
+        self._keep(k, new, row)
+        if float(row @ row) < self.rss:
+            self._keep(k, self.unit, self.white)
+            self.unit, self.white = new, row
+        return True
+
+    def _coordinates(self) -> FloatArray:
+        """What makes a step a sum of differences to the best point ``(D, D)``."""
+        return np.asarray(np.linalg.inv(self.points - self.unit))
+
+    def _or_flat(self, row: FloatArray | None) -> FloatArray:
+        """What is not known is taken for flat."""
+        return self.white if row is None else row
+
+    def _keep(self, k: int, unit: FloatArray, white: FloatArray) -> None:
+        self.points[k], self.whites[k] = unit, white
