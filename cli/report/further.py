@@ -8,15 +8,18 @@ import zarr
 
 from ...core.store import read
 from .figures_force import force_figure
-from .findings import Findings, Table
+from .figures_motion import motion_figure
+from .findings import Findings, Table, number
 
 
 def further_sections(found: Findings) -> Table:
     """What the template needs of the steps ``unknown`` and ``next``; None of those that were not run."""
     unknown, proposed = found.unknown, found.proposed
+    told = found.fit.attrs.get("noise") or {}
+    noise = number(told.get("sd")) if told.get("unit", "m") == "m" else None
     return {
         "unknown": None if unknown is None else {"paragraphs": _text(unknown), "forces": _forces(unknown)},
-        "next": None if proposed is None else {"paragraphs": _text(proposed)},
+        "next": None if proposed is None else {"paragraphs": _text(proposed), "motion": motion_figure(proposed, noise)},
     }
 
 

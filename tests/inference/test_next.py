@@ -18,6 +18,7 @@ from next_world import (
     rope_study,
 )
 
+from muslin.cli.report.figures_motion import motion_figure
 from muslin.core.errors import InputError, StepMissingError
 from muslin.core.store import read
 from muslin.core.study import Study
@@ -66,6 +67,8 @@ def test_tied_drags_are_told_apart_by_a_motion_within_the_limits(tmp_path: Path)
     group = study.step_results("next")
     np.testing.assert_array_equal(read(group, "gripper_pose"), found.motion.poses)  # type: ignore[arg-type]
     assert group.attrs["result"]["probability"] == result["probability"]  # type: ignore[index,call-overload]
+    picture = motion_figure(group, 0.001)
+    assert picture is not None and "quadratic drag" in picture and "beside those of linear drag; grey: noise" in picture
 
 
 def test_nothing_tells_twins_apart_and_that_is_said(tmp_path: Path) -> None:

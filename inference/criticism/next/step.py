@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, norm
 
+from ....core.arrays import FloatArray
 from ....core.errors import InputError
 from ....core.motion import Motion
 from ....core.parameters import ParameterSpace
@@ -86,9 +87,9 @@ def propose_next(
     if goal is not None and (decided := goal.decided()) is not None:
         opening, goal = replace(opening, purpose="nothing", reason=decided), None
     found = Found(None, [], 0, 0)
+    frame_rate = 1.0 / float(np.median(np.diff(problem.recordings[problem.fit_on[0]].series.time)))
+    times = np.arange(int(limits.duration * frame_rate + 1e-9) + 1) / frame_rate
     if goal is not None:
-        frame_rate = 1.0 / float(np.median(np.diff(problem.recordings[problem.fit_on[0]].series.time)))
-        times = np.arange(int(limits.duration * frame_rate + 1e-9) + 1) / frame_rate
         bench = Bench(
             study, known, scenario, times, goal.models, noise, offsets_of(study), shared=goal.purpose == "unseen"
         )
@@ -99,7 +100,7 @@ def propose_next(
     result = _result(study, opening, limits, found, goal, spent, time.monotonic() - began)
     paragraphs = explain(result, limits.text())
     best = found.best if result["probability"] >= HOPELESS else None
-    _save(study, result, paragraphs, best)
+    _save(study, result, paragraphs, best, [] if goal is None else [m.name for m in goal.models], times)
     return NextExperiment(result, tuple(paragraphs), None if best is None else best.motion)
 
 
@@ -192,13 +193,22 @@ def _motion(best: Proposal, limits: Limits) -> dict[str, Any]:
     }
 
 
-def _save(study: Study, result: dict[str, Any], paragraphs: list[str], best: Proposal | None) -> None:
+def _save(
+    study: Study,
+    result: dict[str, Any],
+    paragraphs: list[str],
+    best: Proposal | None,
+    models: list[str],
+    times: FloatArray,
+) -> None:
     with storage_errors(study.results_path):
         group = study.results("r+").create_group("next", overwrite=True)
         if best is not None:
             put(group, "time", best.motion.times, ["time"], "s")
             put(group, "gripper_pose", best.motion.poses, ["time", "gripper", "component"], "m")
             if best.points is not None:
+                put(group, "frame", times, ["frame"], "s")
                 put(group, "predicted", best.points, ["model", "frame", "point", "axis"], "m")
+                group.attrs["models"] = models
         group.attrs.update({"result": result, "text": paragraphs, "fingerprint": study.fingerprint("next")})
         group.attrs["finished"] = True
