@@ -105,6 +105,8 @@ class _Model:
             self.points[k, k] = np.clip(start.unit[k] - inside[k] / 4.0, 0.0, 1.0)
             rows[k] = many(self.points[k : k + 1])[0]
         self.whites = np.stack([self._or_flat(row) for row in rows])
+        k = int(np.argmin(np.linalg.norm(self.whites, axis=1)))
+        self._keep(k, self.points[k].copy(), self.whites[k].copy())
 
     @property
     def rss(self) -> float:
@@ -135,10 +137,7 @@ class _Model:
         share = np.abs(self._coordinates().T @ step)  # of each difference in the step
         far = np.maximum(1.0, (np.abs(self.points - center).max(axis=1) / radius) ** 2)
         k = int(np.argmax(share * far))
-        if gain > 0.0:
-            self._keep(k, self.unit, self.white)
-            self.unit, self.white = new, row
-        elif share[k] > NEAR:
+        if gain > 0.0 or share[k] > NEAR:
             self._keep(k, new, row)
         return gain
 
@@ -152,11 +151,7 @@ class _Model:
         low, high = np.maximum(self.unit - radius, 0.0), np.minimum(self.unit + radius, 1.0)
         corners = np.where(gradient > 0, high, low), np.where(gradient > 0, low, high)
         new = max(corners, key=lambda c: abs(float(gradient @ (c - self.unit))))
-        row = self._or_flat(self._many(new[None])[0])
-        self._keep(k, new, row)
-        if float(row @ row) < self.rss:
-            self._keep(k, self.unit, self.white)
-            self.unit, self.white = new, row
+        self._keep(k, new, self._or_flat(self._many(new[None])[0]))
         return True
 
     def _coordinates(self) -> FloatArray:
@@ -168,4 +163,8 @@ class _Model:
         return self.white if row is None else row
 
     def _keep(self, k: int, unit: FloatArray, white: FloatArray) -> None:
+        """In place of another point; the better of it and the best is the best."""
+        if float(white @ white) < self.rss:
+            self.unit, unit = unit, self.unit
+            self.white, white = white, self.white
         self.points[k], self.whites[k] = unit, white
