@@ -25,6 +25,8 @@ RIGHT, GOOD, BAD = 0.1, 0.7, 0.1
 CHANCE = 10.0
 #: Points so many radii from the best are too far for the model; a worse one is kept if this share of it is new.
 FAR, NEAR = 2.0, 1e-3
+#: A parameter that changes less than this share of what another does is taken for one that does nothing.
+FLAT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +104,8 @@ class _Model:
             return
         rows = list(many(self.points))
         for k in [k for k, row in enumerate(rows) if row is None]:  # the other side may be simulated, or nearer
-            self.points[k, k] = np.clip(start.unit[k] - inside[k] / 4.0, 0.0, 1.0)
+            other = start.unit[k] - inside[k] / 4.0
+            self.points[k, k] = other if 0.0 <= other <= 1.0 else start.unit[k] + inside[k] / 4.0
             rows[k] = many(self.points[k : k + 1])[0]
         self.whites = np.stack([self._or_flat(row) for row in rows])
         k = int(np.argmin(np.linalg.norm(self.whites, axis=1)))
@@ -120,9 +123,14 @@ class _Model:
     def step(self, radius: float) -> tuple[FloatArray, float]:
         """Where the residuals of the model are least within the box and the cube ``(D,)``, and how much it promises."""
         jacobian = self.found.jacobian
-        basis, triangle = np.linalg.qr(jacobian)
-        low, high = np.maximum(-radius, -self.unit), np.minimum(radius, 1.0 - self.unit)
-        step = np.clip(lsq_linear(triangle, -basis.T @ self.white, (low, high), method="bvls").x, low, high)
+        sizes = np.linalg.norm(jacobian, axis=0)
+        moves = sizes > FLAT * sizes.max()  # rounding is no reason to go anywhere
+        step = np.zeros(len(self.unit))
+        if moves.any():
+            basis, triangle = np.linalg.qr(jacobian[:, moves])
+            low, high = np.maximum(-radius, -self.unit)[moves], np.minimum(radius, 1.0 - self.unit)[moves]
+            found = lsq_linear(triangle, -basis.T @ self.white, (low, high), method="bvls").x
+            step[moves] = np.clip(found, low, high)
         there = self.white + jacobian @ step
         return step, self.rss - float(there @ there)
 
@@ -155,8 +163,8 @@ class _Model:
         return True
 
     def _coordinates(self) -> FloatArray:
-        """What makes a step a sum of differences to the best point ``(D, D)``."""
-        return np.asarray(np.linalg.inv(self.points - self.unit))
+        """What makes a step a sum of differences to the best point ``(D, D)``; none across a line of them."""
+        return np.asarray(np.linalg.pinv(self.points - self.unit))
 
     def _or_flat(self, row: FloatArray | None) -> FloatArray:
         """What is not known is taken for flat."""

@@ -78,6 +78,15 @@ def test_what_cannot_be_simulated_is_kept_away_from() -> None:
     np.testing.assert_allclose(found.unit, TRUE, atol=0.02)
 
 
+def test_a_corner_beside_which_nothing_can_be_simulated_is_left_alone() -> None:
+    """An effect of zero whose least strength tears the object, and a parameter that does nothing."""
+    counted = Counted(lambda u: None if u[0] > 0.0 else linear(u * [1, 1, 1, 0]))
+    found = counted.search(np.zeros(4))
+    assert found.unit[0] == 0.0
+    best = least_squares(lambda v: linear(np.array([0.0, *v, 0.0])), [0.5, 0.5], bounds=(0.0, 1.0))
+    assert found.rss < 2.0 * best.cost * 1.01
+
+
 def test_known_derivatives_need_no_differences() -> None:
     counted = Counted(linear)
     start = np.full(4, 0.6)
