@@ -160,8 +160,13 @@ def _serve(connection: Connection, file: str) -> None:
         connection.send(True)
         while True:
             try:
-                connection.send(simulate(problem, connection.recv()))
-            except (EOFError, BrokenPipeError):  # the parent has gone
+                task = connection.recv()
+            except (EOFError, ConnectionError):  # the parent has gone
+                return
+            outcome = simulate(problem, task)
+            try:
+                connection.send(outcome)
+            except ConnectionError:
                 return
 
 
