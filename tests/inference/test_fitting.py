@@ -69,12 +69,13 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     whole = Study.load(write_study(tmp_path / "whole", measurement), workers=1).fit()
     path = write_study(tmp_path / "killed", measurement)
     errors = tmp_path / "errors"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "muslin.cli", "fit", str(path), "--workers", "1"],
-        stdout=subprocess.DEVNULL,
-        stderr=errors.open("w"),
-        cwd=tmp_path,
-    )
+    with errors.open("w") as told:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "muslin.cli", "fit", str(path), "--workers", "1"],
+            stdout=subprocess.DEVNULL,
+            stderr=told,
+            cwd=tmp_path,
+        )
     status = path.parent / "study.results.zarr/fit/draws/status/c"
     deadline = time.monotonic() + 120
     while len(list(status.glob("*"))) < after:
