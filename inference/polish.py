@@ -20,35 +20,24 @@ from .secants import CHANCE, LARGEST, Found, search
 MISFIT, STARTS, APART = 1.5, 4, 0.1
 #: Evaluations of a search, and from each of these before they are given up.
 EVALUATIONS, FEW_EVALUATIONS = 40, 10
-#: A search ends where it promises less in -2 log likelihood. Where it leaves this times what noise leaves it looks
-#: around once more, from a kink perhaps, until that gains less than this share.
-TOLD_APART, KINKED, LITTLE = 0.3, 1.05, 0.01
+#: A search ends where it promises less in -2 log likelihood. From a kink where it leaves this times what noise leaves
+#: it looks around once more.
+TOLD_APART, KINKED = 0.3, 1.05
 #: How far derivatives are trusted at first, and the smallest steps before they are taken.
 NEARBY, COARSE = 0.02, 0.002
 
 
 @dataclass(frozen=True, eq=False)
-class Polished:
-    """The best fit found.
+class Polished(Found):
+    """The best fit found, in units of the noise.
 
     Args:
-        unit: parameters in the unit cube ``(D,)``.
         covariance: of ``unit``, from the curvature at the best fit (Laplace), ``(D, D)``.
-        jacobian: of the white residuals ``(N, D)``.
-        white: white residuals at the best fit ``(N,)``.
         count: independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left.
     """
 
-    unit: FloatArray
     covariance: FloatArray
-    jacobian: FloatArray
-    white: FloatArray
     count: float
-
-    @property
-    def rss(self) -> float:
-        """Residual sum of squares, in units of the noise variance."""
-        return float(self.white @ self.white)
 
 
 class Objective:
@@ -152,8 +141,8 @@ def polish(
 ) -> Polished:
     """Bounded least squares from ``start`` in the unit cube; see :mod:`.secants`.
 
-    Where it comes to rest it goes on by derivatives, and while it leaves a misfit it looks around farther off: small
-    differences see a way down a narrow valley that wide ones do not, and wide ones a way out of a kink.
+    Where it comes to rest on a kink, with a misfit left, it looks around farther off; then it goes on by derivatives,
+    which see a way down a narrow valley that wide differences do not; and so on, until that gains next to nothing.
 
     Args:
         objective: to make least.
@@ -162,33 +151,31 @@ def polish(
         known: Jacobian at ``start`` ``(N, D)``, if there is one already.
         roughly: for an unfinished search: it comes to rest once, and its curvature is not to be relied on.
     """
-    start = np.asarray(start, float)
+    start = np.clip(start, 0.0, 1.0)
     white = objective.one(start)
-    count = objective.count(white)
-    least, enough = objective.discrepancy.step, TOLD_APART / count
-    coarse = max(least, COARSE)
+    count, least = objective.count(white), objective.discrepancy.step
+    enough, coarse = TOLD_APART / count, max(least, COARSE)
     at = Found(start, white, np.zeros((len(white), len(start))) if known is None else known)
-    best, used = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
-    jacobian, moved = best.jacobian, not roughly
-    while moved:
-        jacobian, moved = objective.jacobian(best.unit, best.white), False
-        nearby = replace(best, jacobian=jacobian)
-        tries = [(nearby, CHANCE * enough, NEARBY, least)]
-        if best.rss > KINKED * count:
-            tries.insert(0, (best, LITTLE, LARGEST, coarse))
-        for begin, wanted, radius, smallest in tries:
-            if used < evaluations and not moved:
-                found, more = search(
-                    objective.many, begin, evaluations - used,
-                    enough=enough, least=smallest, radius=radius, known=begin is nearby,
-                )  # fmt: skip
-                used += more + len(start)
-                moved = found.rss < (1.0 - wanted) * best.rss
-                best = found if moved else best
+    best, used, smooth = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
+    while True:
+        before = best.rss
+        if used < evaluations and not (roughly or smooth) and best.rss > KINKED * count:
+            best, more, _ = search(
+                objective.many, best, evaluations - used, enough=enough, least=coarse, radius=LARGEST
+            )
+            used += more + len(start)
+        jacobian = best.jacobian if roughly else objective.jacobian(best.unit, best.white)
+        if roughly or used >= evaluations:
+            break
+        at, left = replace(best, jacobian=jacobian), evaluations - used
+        best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
+        used += more + len(start)
+        if before - best.rss < CHANCE * enough * best.rss:  # so near that the derivatives hold
+            break
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
     information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
     covariance = np.asarray(np.linalg.inv(information), float)
-    return Polished(best.unit, covariance, jacobian, best.white, count)
+    return Polished(best.unit, best.white, jacobian, covariance, count)
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:

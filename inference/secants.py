@@ -31,7 +31,13 @@ FLAT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The best point ``(D,)``, white residuals there ``(N,)``, and derivatives by secants ``(N, D)``."""
+    """Where a search came to.
+
+    Args:
+        unit: the best point ``(D,)``.
+        white: white residuals there ``(N,)``.
+        jacobian: their derivatives ``(N, D)``, by secants or by differences.
+    """
 
     unit: FloatArray
     white: FloatArray
@@ -39,6 +45,7 @@ class Found:
 
     @property
     def rss(self) -> float:
+        """Residual sum of squares."""
         return float(self.white @ self.white)
 
 
@@ -51,8 +58,8 @@ def search(
     least: float,
     radius: float = RADIUS,
     known: bool = False,
-) -> tuple[Found, int]:
-    """Least squares from ``start`` in the unit cube, and how many steps it took.
+) -> tuple[Found, int, bool]:
+    """Least squares from ``start`` in the unit cube, how many steps it took, and if its model was right in the end.
 
     Args:
         many: residuals.
@@ -89,7 +96,7 @@ def search(
             break
         else:
             radius = min(radius / 2.0, max(size, radius / 4.0))
-    return model.found, used
+    return model.found, used, right
 
 
 class _Model:

@@ -23,7 +23,7 @@ def motion_figure(proposed: zarr.Group, noise: float | None) -> str | None:
         proposed: what the step stored.
         noise: standard deviation of a coordinate [m]; None if it is in pixels.
     """
-    if "predicted" not in proposed or "frame" not in proposed:
+    if "predicted" not in proposed or "frame_time" not in proposed:
         return None
     poses, predicted = (np.asarray(read(proposed, name)) for name in ("gripper_pose", "predicted"))
     with look("motion"):
@@ -31,7 +31,7 @@ def motion_figure(proposed: zarr.Group, noise: float | None) -> str | None:
         path, apart = figure.subplots(1, 2)
         _path(path, np.asarray(read(proposed, "time")), poses[..., :3])
         names = [str(name) for name in cast(Sequence[object], proposed.attrs["models"])]
-        _apart(apart, np.asarray(read(proposed, "frame")), predicted, names, noise)
+        _apart(apart, np.asarray(read(proposed, "frame_time")), predicted, names, noise)
         return svg(figure, "displacement of the grippers over time, and how far the models' predictions are apart")
 
 

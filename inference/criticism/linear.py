@@ -63,7 +63,7 @@ class Look:
     def as_fit(self, plain: Polished, unit: FloatArray, white: FloatArray) -> Polished:
         """A point ``unit (D,)`` with residuals ``white (N,)`` as a fit, with the curvature of this look."""
         information = self.jacobian.T @ self.jacobian + 12.0 * np.eye(len(unit))
-        return Polished(unit, np.asarray(np.linalg.inv(information), float), self.jacobian, white, plain.count)
+        return Polished(unit, white, self.jacobian, np.asarray(np.linalg.inv(information), float), plain.count)
 
 
 def look_at(name: str, objective: Objective, plain: Polished) -> Look:

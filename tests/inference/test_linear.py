@@ -65,7 +65,7 @@ class Slip(Objective):
     def plain(self) -> Polished:
         white = self.many(np.array([[0.5, 0.0]]))[0]
         assert white is not None
-        return Polished(np.array([0.5]), np.eye(1), self.stiff[:, None], white, 50.0)
+        return Polished(np.array([0.5]), white, self.stiff[:, None], np.eye(1), 50.0)
 
 
 def test_a_look_tells_how_large_the_response_is() -> None:

@@ -20,7 +20,7 @@ class Counted:
     """Residuals of a function of one point, and how often they were asked for."""
 
     def __init__(self, white: Callable[[FloatArray], FloatArray | None]) -> None:
-        self.white, self.points = white, []  # type: ignore[var-annotated]
+        self.white, self.points, self.right = white, list[FloatArray](), False
 
     def __call__(self, units: FloatArray) -> list[FloatArray | None]:
         self.points.extend(units)
@@ -30,7 +30,7 @@ class Counted:
         white = self.white(start)
         assert white is not None
         begin = Found(start, white, np.zeros((len(white), len(start))))
-        found, used = search(self, begin, evaluations, **{"enough": 1e-5, "least": 1e-4, **how})  # type: ignore[arg-type]
+        found, used, self.right = search(self, begin, evaluations, **{"enough": 1e-5, "least": 1e-4, **how})  # type: ignore[arg-type]
         assert len(self.points) <= used + 2 * len(start) and used <= evaluations
         return found
 
@@ -56,7 +56,9 @@ def test_the_least_square_within_the_cube(start: list[float]) -> None:
 
 
 def test_derivatives_are_those_of_a_linear_function() -> None:
-    np.testing.assert_allclose(Counted(linear).search(np.full(4, 0.3)).jacobian, MATRIX, rtol=1e-6)
+    counted = Counted(linear)
+    np.testing.assert_allclose(counted.search(np.full(4, 0.3)).jacobian, MATRIX, rtol=1e-6)
+    assert counted.right
 
 
 def test_kinks_that_stop_derivatives_do_not_stop_it() -> None:
@@ -69,7 +71,9 @@ def test_kinks_that_stop_derivatives_do_not_stop_it() -> None:
     stopped = least_squares(flat, start, bounds=(0.0, 1.0))
     np.testing.assert_array_equal(stopped.x, start)
     smooth = 2.0 * least_squares(linear, start, bounds=(0.0, 1.0)).cost
-    assert Counted(flat).search(start).rss < 1.3 * smooth < 0.01 * stopped.cost
+    counted = Counted(flat)
+    assert counted.search(start).rss < 1.3 * smooth < 0.01 * stopped.cost
+    assert not counted.right
 
 
 def test_what_cannot_be_simulated_is_kept_away_from() -> None:
@@ -90,7 +94,7 @@ def test_a_corner_beside_which_nothing_can_be_simulated_is_left_alone() -> None:
 def test_known_derivatives_need_no_differences() -> None:
     counted = Counted(linear)
     start = np.full(4, 0.6)
-    found, used = search(counted, Found(start, linear(start), MATRIX), 50, enough=1e-5, least=1e-4, known=True)
+    found, used, _ = search(counted, Found(start, linear(start), MATRIX), 50, enough=1e-5, least=1e-4, known=True)
     assert len(counted.points) == used <= 8
     np.testing.assert_allclose(found.unit, TRUE, atol=0.02)
 

@@ -23,7 +23,7 @@ def candidate(
 ) -> Candidate:
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter(f"{name}.strength", "1", 0, 1)))
     white = np.full(int(COUNT), np.sqrt(rss / COUNT))
-    fit = Polished(np.array([0.5, coefficient]), np.diag([1e-4, sd**2]), np.zeros((len(white), 2)), white, COUNT)
+    fit = Polished(np.array([0.5, coefficient]), white, np.zeros((len(white), 2)), np.diag([1e-4, sd**2]), COUNT)
     return Candidate(name, space, 1, fit, {"other": held_out}, (held_out / 0.003) ** 2, numerics, refitted=True)
 
 

@@ -207,8 +207,8 @@ def _save(
             put(group, "time", best.motion.times, ["time"], "s")
             put(group, "gripper_pose", best.motion.poses, ["time", "gripper", "component"], "m")
             if best.points is not None:
-                put(group, "frame", times, ["frame"], "s")
-                put(group, "predicted", best.points, ["model", "frame", "point", "axis"], "m")
+                put(group, "frame_time", times, ["frame_time"], "s")
+                put(group, "predicted", best.points, ["model", "frame_time", "point", "axis"], "m")
                 group.attrs["models"] = models
         group.attrs.update({"result": result, "text": paragraphs, "fingerprint": study.fingerprint("next")})
         group.attrs["finished"] = True
