@@ -191,8 +191,8 @@ def polish_from(objective: Objective, starts: FloatArray) -> Polished:
             break
         if min(np.abs(start - k).max() for k in known) > APART:
             tried += 1
-            other = polish(objective, start, FEW_EVALUATIONS)
+            other = polish(objective, start, FEW_EVALUATIONS, roughly=True)
             known += [start, other.unit]
-            if other.rss < best.rss:
-                best = min(other, polish(objective, other.unit), key=lambda p: p.rss)
+            if best.rss - other.rss > CHANCE * TOLD_APART * best.rss / best.count:  # more than the same place again
+                best = polish(objective, other.unit)
     return best

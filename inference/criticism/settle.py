@@ -7,11 +7,12 @@ from scipy import stats
 
 from .candidate import Candidate, best_starts
 from .stage import MORE_EVALUATIONS, NEARLY, Stage
-from .verdict import EXPLAINS, Evidence, decide, objection
+from .verdict import EXPLAINS, MARGIN, Evidence, decide, objection
 from .work import Work
 
-#: Points of the parameters' prior that are looked at (a power of two), and how many of the best are fitted from.
-PLACES, RESTARTS = 16, 2
+#: Points of the parameters' prior that are looked at (a power of two), how many of the best are fitted from, and
+#: evaluations of each before it is given up.
+PLACES, RESTARTS, FEW_EVALUATIONS = 16, 2, 12
 
 
 def settled(work: Work, stage: Stage) -> Stage:
@@ -51,9 +52,10 @@ def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
         rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
         points = np.repeat(c.fit.unit[None], PLACES, axis=0)
         points[:, : c.base] = stats.qmc.Sobol(c.base, rng=rng).random(PLACES)
-        starts = best_starts(work.objective(effects), points)[:RESTARTS]
-        fits = [c.fit, *(work.polished(effects, unit, MORE_EVALUATIONS) for unit, _ in starts)]
-        c = replace(c, fit=min(fits, key=lambda p: p.rss))
+        for unit, _ in best_starts(work.objective(effects), points)[:RESTARTS]:
+            there = work.roughly_polished(effects, unit, FEW_EVALUATIONS, None)
+            if c.rss - there.rss > MARGIN:  # more than the same place again
+                c = replace(c, fit=work.polished(effects, there.unit, MORE_EVALUATIONS))
     return work.judged(c)
 
 

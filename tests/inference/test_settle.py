@@ -32,6 +32,11 @@ class Bench:
         rss = self.floors[name] if unit[0] != 0.5 else 9 * COUNT  # 0.5: where the first fit rests
         return replace(candidate("x", rss).fit, unit=unit)
 
+    def roughly_polished(
+        self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None
+    ) -> Polished:
+        return self.polished(effects, start, evaluations)
+
     def objective(self, effects: tuple[str, ...]) -> SimpleNamespace:
         return SimpleNamespace(many=lambda points: [np.ones(3) for _ in points])
 
