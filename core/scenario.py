@@ -1,8 +1,8 @@
 """Scenarios: an object, how it is held, what is around it and where its markers sit."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TypeAlias
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import TypeAlias, cast
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from .obstacles import Obstacle
 from .scene import Scene
 
 STANDARD_GRAVITY = 9.80665
+#: Clocks [s] and gripper poses [m] that differ by less than this are the same.
+_SAME = 1e-6
 #: ``(body [world, to scale], poses of the grippers (G, 7), grasps, obstacles, clearance [m]) -> start (V, 3) [m],
 #: world``. ``clearance`` is how far from an obstacle's surface a vertex stays. Of a module, so that it pickles.
 StartShape: TypeAlias = Callable[[Body, FloatArray, tuple[IntArray, ...], tuple[Obstacle, ...], float], FloatArray]
@@ -83,6 +85,14 @@ class Scenario:
             )
         return replace(self, motion=motion, times=recording.series.time, load=recording.load)
 
+    def same_rollout(self, other: "Scenario") -> bool:
+        """Whether the other one is this one played again, as with takes of one motion."""
+        mine, theirs = ((s.times, s.motion.times, s.motion.poses) for s in (self, other))
+        near = (
+            a.shape == b.shape and np.allclose(a, b, rtol=0.0, atol=_SAME) for a, b in zip(mine, theirs, strict=True)
+        )
+        return all(near) and _equal(self, replace(other, times=self.times, motion=self.motion))
+
     def world_vertices(self, scale: float = 1.0) -> FloatArray:
         """Rest vertices ``(V, 3)`` [m] as held at the start; ``scale`` stretches about the first grasp."""
         about = self.body.vertices[self.grasps[0]].mean(axis=0) if self.grasps else self.body.vertices.mean(axis=0)
@@ -128,6 +138,22 @@ class Scenario:
             local = rotate(inverse(start[g, 3:]), vertices[ids] - start[g, :3])
             parts.append(rotate(poses[:, g, None, 3:], local[None]) + poses[:, g, None, :3])
         return np.concatenate(parts, axis=1) if parts else np.zeros((len(times), 0, 3))
+
+
+def _equal(a: object, b: object) -> bool:
+    """Whether two values hold the same, down to the numbers in arrays; functions are themselves alone."""
+    if a is b:
+        return True
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, cast(np.ndarray, b))
+    if isinstance(a, tuple):
+        other = cast(tuple[object, ...], b)
+        return len(a) == len(other) and all(map(_equal, a, other))
+    if is_dataclass(a):
+        return all(_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    return bool(a == b)
 
 
 def marker_weights(count: int, ids: IntArray) -> FloatArray:

@@ -4,11 +4,13 @@ import os
 import pickle
 import tempfile
 import warnings
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from queue import SimpleQueue
 from types import TracebackType
+from typing import TypeAlias
 
 from threadpoolctl import threadpool_limits
 
@@ -17,6 +19,9 @@ from .problem import Problem
 from .worker import CannotStart, Failure, Outcome, Task, Worker, simulate
 
 __all__ = ["Failure", "Outcome", "SimulationPool", "Task"]
+
+#: A recording and the values that it is simulated with.
+Rollout: TypeAlias = tuple[str, tuple[tuple[str, float], ...]]
 
 _NO_WORKERS = (
     "worker processes cannot start. In a script of your own, put what runs under: if __name__ == '__main__'. "
@@ -46,6 +51,7 @@ class SimulationPool:
         self.problem = problem
         self.workers = workers if workers is not None else (os.cpu_count() or 1)
         self.count = 0  # rollouts run
+        self._played_as = problem.played_as()
         self._threads: ThreadPoolExecutor | None = None
         self._idle: SimpleQueue[Worker | None] = SimpleQueue()  # None: a process yet to be started
         self._busy: set[Worker] = set()
@@ -75,17 +81,19 @@ class SimulationPool:
             self._file = None
 
     def map(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
-        """Outcomes in the order of ``tasks``.
+        """Outcomes in the order of ``tasks``; what several of them ask for is simulated once.
 
         Raises:
             InputError: every task is refused by muslin or a plugin, and so was every one before: that is not a
                 matter of numbers.
             MuslinError: no worker process can start.
         """
-        tasks = list(tasks)
-        self.count += len(tasks)
+        asked = [(self._played_as[t.recording], tuple(sorted(t.values.items()))) for t in tasks]
+        once = list(dict.fromkeys(asked))
+        self.count += len(once)
+        outcomes = _repeated(asked, self._outcomes([Task(dict(values), name) for name, values in once]))
         refused: list[Failure] = []
-        for outcome in self._outcomes(tasks):
+        for outcome in outcomes:
             if not self._accepted and isinstance(outcome, Failure) and outcome.refused:
                 refused.append(outcome)
                 continue
@@ -171,3 +179,13 @@ class SimulationPool:
             if worker is not None:
                 self._busy.discard(worker)
             self._idle.put(worker)
+
+
+def _repeated(asked: list[Rollout], once: Iterator[Outcome]) -> Iterator[Outcome]:
+    """``once``, in the order of first mention, to everybody who asked; each is kept no longer than somebody waits."""
+    waiting, kept = Counter(asked), dict[Rollout, Outcome]()
+    for key in asked:
+        if key not in kept:
+            kept[key] = next(once)
+        waiting[key] -= 1
+        yield kept[key] if waiting[key] else kept.pop(key)

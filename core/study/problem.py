@@ -77,6 +77,14 @@ class Problem:
         seen = self.extractor.extract(trajectory.series, trajectory.series.time)
         return replace(trajectory, series=seen)
 
+    def played_as(self) -> dict[str, str]:
+        """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
+        out: dict[str, str] = {}
+        for name, scenario in self.scenarios.items():
+            first = (n for n in dict.fromkeys(out.values()) if self.scenarios[n].same_rollout(scenario))
+            out[name] = next(first, name)
+        return out
+
     def prepare(self) -> None:
         """Let the simulator get ready in this process, so that no rollout pays for it in time; nothing is raised."""
         with suppress(Exception):

@@ -34,29 +34,30 @@ def numerical_directions(
     problem = pool.problem
     names = (*problem.fit_on, *problem.hold_out)
     used = [problem.effects[e] for e in {n.split(".", 1)[0] for n in values if "." in n}]
-    variants: list[tuple[Problem, float]] = []
+    variants: list[tuple[Problem, float, int]] = []  # how much its change counts, and on how many processes
     finer = problem.simulator.finer()
     if finer is not None:
-        variants.append((replace(problem, simulator=finer), _STEP))
+        variants.append((replace(problem, simulator=finer), _STEP, 1))
     meshes = {n: refined(problem.scenarios[n]) for n in names}
     if all(s is not None for s in meshes.values()):
         whole = {n: s for n, s in meshes.items() if s is not None}
-        variants.append((replace(problem, scenarios={**problem.scenarios, **whole}), _MESH))
+        variants.append((replace(problem, scenarios={**problem.scenarios, **whole}), _MESH, pool.workers))
     for simulator in _others(problem.simulator):
         scenario = problem.scenarios[names[0]]
         if not any(why_powerless(effect, simulator, scenario) for effect in used):
-            variants.append((replace(problem, simulator=simulator), 1.0))
+            variants.append((replace(problem, simulator=simulator), 1.0, 1))
     as_it_is = _predicted(pool, values, names)
     columns: dict[str, list[FloatArray]] = {n: [] for n in names}
     with ExitStack() as stack:  # an interruption ends the processes first, then the threads that wait for them
         threads = stack.enter_context(ThreadPoolExecutor(max(1, pool.workers)))
-        # a few rollouts each: starting more than one process would take longer
-        pools = [stack.enter_context(SimulationPool(variant, min(1, pool.workers))) for variant, _ in variants]
+        # a few rollouts each: but on the finer mesh, starting more than one process would take longer
+        pools = [stack.enter_context(SimulationPool(v, min(most, pool.workers))) for v, _, most in variants]
         others = list(threads.map(lambda elsewhere: _predicted(elsewhere, values, names), pools))
-    for (_, size), made in zip(variants, others, strict=True):
+        cost = sum(elsewhere.count for elsewhere in pools)
+    for (_, size, _), made in zip(variants, others, strict=True):
         for name in made.keys() & as_it_is.keys():
             columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
-    return {n: np.stack(c, axis=1) for n, c in columns.items() if c}, len(names) * len(variants)
+    return {n: np.stack(c, axis=1) for n, c in columns.items() if c}, cost
 
 
 def _others(simulator: Simulator) -> list[Simulator]:

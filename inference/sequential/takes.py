@@ -8,8 +8,6 @@ from ...core.arrays import FloatArray, IntArray
 from ...core.scenario import Scenario
 from ..observe import Observer
 
-#: Scenarios whose clocks [s] and gripper poses [m] differ by less than this are the same.
-_SAME = 1e-6
 #: Draws that are observed at a time; bounds the memory that sixteen takes need.
 _CHUNK = 64
 
@@ -35,9 +33,8 @@ class Takes:
         for i, recording in enumerate(recordings):
             for group in self._groups:
                 first = recordings[group[0]]
-                if first.series.correspondence == recording.series.correspondence and _same(
-                    scenarios[first.name], scenarios[recording.name]
-                ):
+                alike = first.series.correspondence == recording.series.correspondence
+                if alike and scenarios[first.name].same_rollout(scenarios[recording.name]):
                     group.append(i)
                     break
             else:
@@ -91,13 +88,3 @@ class Takes:
                 total, count = np.where(seen, takes, 0.0).sum(axis=0), seen.sum(axis=0)
                 out.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
         return [np.where(unmeasured, 0.0, a) for unmeasured, a in zip(self._unmeasured, out, strict=True)]
-
-
-def _same(a: Scenario, b: Scenario) -> bool:
-    """Whether two scenarios of one study have the same rollouts."""
-    pairs = [(a.times, b.times), (a.motion.times, b.motion.times), (a.motion.poses, b.motion.poses)]
-    return (
-        abs(a.load - b.load) < _SAME
-        and all(x.shape == y.shape and np.allclose(x, y, rtol=0.0, atol=_SAME) for x, y in pairs)
-        and np.array_equal(a.markers, b.markers)
-    )

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -6,7 +7,9 @@ import pytest
 from muslin.core.errors import InputError
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
+from muslin.core.obstacles import Table
 from muslin.core.scenario import bound_markers, marker_weights
+from muslin.core.scenarios.starts import GivenShape
 from muslin.core.series import PointSeries
 from muslin.core.testing.samples import sample_body, sample_scenario
 
@@ -38,6 +41,33 @@ def test_marker_weights_of_another_mesh() -> None:
         replace(sample_scenario("cloth"), markers=np.eye(7))
     with pytest.raises(InputError, match="vertex 12"):
         marker_weights(12, np.array([12]))
+
+
+def test_a_take_of_the_same_motion_has_the_same_rollout() -> None:
+    first = sample_scenario("cloth")
+    again = sample_scenario("cloth")
+    late = Motion(again.motion.times, again.motion.poses + 1e-9)
+    assert first.same_rollout(replace(again, times=again.times + 1e-9, motion=late))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"settle": 0.5},
+        {"grasps": (np.array([1]),)},
+        {"obstacles": (Table(0.0),)},
+        {"start": GivenShape(np.zeros((12, 3)), 1.0, np.zeros(3))},
+        {"motion": Motion(np.zeros(1), np.tile([0, 0, 1e-3, 1, 0, 0, 0.0], (1, 1, 1)))},
+        {"times": np.linspace(0.0, 0.123, 7)},
+        {"markers": marker_weights(12, np.array([3]))},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_whatever_differs_makes_another_rollout(change: dict[str, Any]) -> None:
+    first = sample_scenario("cloth")
+    other = replace(first, **change)
+    assert not first.same_rollout(other) and not other.same_rollout(first)
+    assert other.same_rollout(replace(other))
 
 
 def test_held_vertices_follow_a_turning_gripper() -> None:

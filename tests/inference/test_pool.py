@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from muslin.backends.mujoco.simulator import MujocoSimulator
@@ -115,6 +116,22 @@ def test_an_engine_harms_nothing_but_its_own_task(small_study: Study, workers: i
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("workers", [0, 2])
+def test_takes_of_one_motion_are_simulated_once(small_study: Study, workers: int) -> None:
+    problem = small_study.problem
+    again = {**problem.scenarios, "near-again": replace(problem.scenarios["near"])}
+    with SimulationPool(replace(problem, scenarios=again), workers) as pool:
+        assert pool.problem.played_as() == {**{n: n for n in problem.scenarios}, "near-again": "near"}
+        other = {**VALUES, "stretch_stiffness": 300.0}
+        tasks = [Task(VALUES, "near"), Task(other, "near-again"), Task(VALUES, "far"), Task(VALUES, "near-again")]
+        first, stiffer, far, second = pool.map([*tasks])
+        assert pool.count == 3
+    assert isinstance(first, Trajectory) and isinstance(far, Trajectory) and isinstance(stiffer, Trajectory)
+    assert second is first
+    assert not np.array_equal(first.series.points, stiffer.series.points)
+    assert not np.array_equal(first.series.points, far.series.points)
+
+
 def test_a_hang_costs_its_time_limit_and_no_more(small_study: Study) -> None:
     problem = replace(small_study.problem, effects={"harm": Harm}, time_limit=1.0)
     with SimulationPool(problem, 1) as pool:
