@@ -1,6 +1,8 @@
 """Least squares over a simulator that sometimes fails: what is not known stays as wide as the prior."""
 
 import numpy as np
+import pytest
+from scipy.optimize import least_squares
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
@@ -63,6 +65,27 @@ def test_it_comes_to_the_bottom_of_a_narrow_valley() -> None:
     assert best.rss < floor + 0.3
     truth = np.array([[-600 * 0.8, 300], [-30, 0]])
     np.testing.assert_allclose(best.jacobian[:2], truth, rtol=0.05, atol=0.5)
+
+
+class Missing(Linear):
+    """A curved problem that lacks something: what no parameter reaches is far more than the noise."""
+
+    calls = 0
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        self.calls += len(units)
+        lacks = 8.0 * np.random.default_rng(2).normal(size=40)
+        return [self.matrix @ (u + 0.3 * u**2 - np.array([0.4, 0.7])) + lacks for u in units]
+
+
+@pytest.mark.parametrize("start", [(0.1, 0.1), (0.9, 0.9), (0.5, 0.1), (0.3, 0.6)])
+def test_a_misfit_that_no_parameter_reaches_costs_no_long_search(start: tuple[float, float]) -> None:
+    missing = Missing(2.0)
+    best = polish(missing, np.array(start))
+    assert best.rss > 20 * best.count and missing.calls < 15
+    exact = least_squares(missing.one, best.unit, xtol=1e-12, ftol=1e-12, gtol=1e-12).x
+    sd = np.sqrt(np.diag(best.covariance) * best.rss / best.count)  # of what is left, noise or not
+    assert (np.abs(best.unit - exact) < 0.3 * sd).all()
 
 
 def test_derivatives_are_taken_at_the_step_that_is_told() -> None:
