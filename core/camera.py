@@ -2,9 +2,11 @@
 
 import json
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tomli_w
@@ -141,10 +143,25 @@ class Camera:
         local = np.stack([(u - self.cx) / self.fx, (v - self.cy) / self.fy, np.ones(u.shape)], axis=-1)
         return rotate(self.pose[3:], local)
 
+    def as_table(self) -> dict[str, Any]:
+        """What a camera file holds."""
+        table = {k: getattr(self, k) for k in ("width", "height", "fx", "fy", "cx", "cy")}
+        return table | {"position": self.pose[:3].tolist(), "quaternion": self.pose[3:].tolist()}
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Any]) -> "Camera":
+        """The camera of a table; an :class:`InputError` names the key that is wrong."""
+        try:
+            t = _File.model_validate(table)
+        except ValidationError as error:
+            wrong = [f"{'.'.join(map(str, e['loc'])) or 'the file'}: {e['msg']}" for e in error.errors()]
+            raise InputError(f"{'; '.join(wrong)}. Keys: {', '.join(_File.model_fields)}") from error
+        pose = np.array([*t.position, *t.quaternion])
+        return cls(t.width, t.height, t.fx, t.fx if t.fy is None else t.fy, *t.middle(), pose)
+
     def save(self, path: Path) -> None:
         """Write a camera file, JSON if its name ends so, else TOML."""
-        table = {k: getattr(self, k) for k in ("width", "height", "fx", "fy", "cx", "cy")}
-        table |= {"position": self.pose[:3].tolist(), "quaternion": self.pose[3:].tolist()}
+        table = self.as_table()
         write_text(path, json.dumps(table, indent=1) + "\n" if path.suffix == ".json" else tomli_w.dumps(table))
 
     @classmethod
@@ -163,14 +180,7 @@ class Camera:
         except ValueError as error:  # of either format, and bytes that are no text
             raise InputError(f"camera file {path} cannot be read: {error}") from error
         try:
-            t = _File.model_validate(table)
-            pose = np.array([*t.position, *t.quaternion])
-            return cls(t.width, t.height, t.fx, t.fx if t.fy is None else t.fy, *t.middle(), pose)
-        except ValidationError as error:
-            wrong = [f"{'.'.join(map(str, e['loc'])) or 'the file'}: {e['msg']}" for e in error.errors()]
-            raise InputError(
-                f"camera file {path}: {'; '.join(wrong)}. Keys: {', '.join(_File.model_fields)}"
-            ) from error
+            return cls.from_table(table)
         except InputError as error:
             raise InputError(f"camera file {path}: {error}") from error
 

@@ -7,7 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
+from .frames import Frames
 from .series import PointSeries
+from .simulated_take import SimulatedTake
 
 
 class KeypointExtractor(ABC):
@@ -20,10 +22,20 @@ class KeypointExtractor(ABC):
     #: True if it needs images; then :meth:`extract` gets frames, else it gets points.
     needs_images: ClassVar[bool]
 
-    def fit(self, frames: npt.NDArray[np.uint8], keypoints: FloatArray) -> None:
-        """Learn from annotated ``frames (N, H, W, 3)`` with ``keypoints (N, K, 2)`` [px]."""
+    def fit(self, frames: Frames | npt.NDArray[np.uint8], keypoints: FloatArray | None = None) -> None:
+        """Learn from ``frames (N, H, W, 3)``, and ``keypoints (N, K, 2)`` [px] where they are annotated."""
         return None
 
     @abstractmethod
-    def extract(self, source: PointSeries | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
+    def extract(self, source: PointSeries | Frames | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
         """Points of ``source``: a point series, or frames ``(T, H, W, 3)`` at ``time (T,)`` [s]."""
+
+    def observe(self, take: SimulatedTake) -> PointSeries:
+        """Points of a simulated take, as they would have been found in a recording of it.
+
+        By default those of its rendered frames, or of its markers, which are in pixels where a camera measured.
+        """
+        if self.needs_images:
+            return self.extract(take.frames(), take.series.time)
+        seen = take.series if take.camera is None else take.projected()
+        return self.extract(seen, seen.time)

@@ -3,9 +3,21 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from .camera import Camera
 from .errors import InputError
 from .motion import Motion
 from .series import PointSeries
+
+
+def check_name(name: str) -> None:
+    """Raise :class:`InputError` unless a recording may be called so.
+
+    The name becomes a folder of the store, whose own files and reserved names must stay free.
+    """
+    if not name.isprintable() or set(name) & set("/\\") or name.startswith((".", "__")):
+        raise InputError(f"a recording needs a name without slashes that starts with a letter, got {name!r}")
+    if not name or name == "zarr.json":
+        raise InputError(f"a recording cannot be named {name!r}; give it another name")
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,6 +30,7 @@ class Recording:
         gripper: gripper poses, or None when nothing moved (a clamped object).
         motion: recordings with the same motion are repeats of each other; default the name.
         load: extra mass hung where the scenario says [kg].
+        camera: that the pixels are of, or None; of points in metres it says how they would look.
     """
 
     name: str
@@ -25,13 +38,10 @@ class Recording:
     gripper: Motion | None = None
     motion: str = ""
     load: float = 0.0
+    camera: Camera | None = None
 
     def __post_init__(self) -> None:
-        # the name becomes a folder of the store, whose own files and reserved names must stay free
-        if not self.name.isprintable() or set(self.name) & set("/\\") or self.name.startswith((".", "__")):
-            raise InputError(f"a recording needs a name without slashes that starts with a letter, got {self.name!r}")
-        if not self.name or self.name == "zarr.json":
-            raise InputError(f"a recording cannot be named {self.name!r}; give it another name")
+        check_name(self.name)
         if not 0 <= self.load < float("inf"):
             raise InputError(f"recording {self.name!r}: load must be finite and not negative, but is {self.load:g} kg")
         if not self.motion:

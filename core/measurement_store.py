@@ -6,6 +6,7 @@ from typing import Any, cast
 
 import zarr
 
+from .camera import Camera
 from .errors import InputError
 from .measurement import Measurement, Recording
 from .motion import Motion
@@ -36,16 +37,24 @@ def save_measurement(
             put(group, "time", r.series.time, ["time"], "s")
             put(group, "axis", list(range(r.series.points.shape[2])), ["axis"], "1", "x, y, z")
             put(group, "points", r.series.points, ["time", "point", "axis"], r.series.unit, "measured points")
+            if r.camera is not None:
+                group.attrs["camera"] = r.camera.as_table()
             if r.gripper is not None:
-                put(group, "gripper_time", r.gripper.times, ["gripper_time"], "s")
-                put(
-                    group,
-                    "gripper_pose",
-                    r.gripper.poses,
-                    ["gripper_time", "gripper", "pose"],
-                    "m",
-                    "position x y z [m], quaternion w x y z",
-                )
+                put_gripper(group, r.gripper)
+
+
+def put_gripper(group: zarr.Group, gripper: Motion) -> None:
+    """Write the gripper poses of one recording."""
+    put(group, "gripper_time", gripper.times, ["gripper_time"], "s")
+    dims = ["gripper_time", "gripper", "pose"]
+    put(group, "gripper_pose", gripper.poses, dims, "m", "position x y z [m], quaternion w x y z")
+
+
+def read_gripper(group: zarr.Group) -> Motion | None:
+    """The gripper poses of one recording, or None where nothing moved."""
+    if "gripper_pose" not in group:
+        return None
+    return Motion(read(group, "gripper_time"), read(group, "gripper_pose"))
 
 
 def load_measurement(path: Path) -> Measurement:
@@ -68,10 +77,10 @@ def _recording(root: zarr.Group, name: str, path: Path) -> Recording:
         group = subgroup(root, name)
         unit = cast(PointUnit, str(group["points"].attrs["units"]))
         series = PointSeries(read(group, "time"), read(group, "points"), unit, bool(group.attrs["correspondence"]))
-        gripper = None
-        if "gripper_pose" in group:
-            gripper = Motion(read(group, "gripper_time"), read(group, "gripper_pose"))
-        return Recording(name, series, gripper, str(group.attrs["motion"]), float(cast(float, group.attrs["load_kg"])))
+        table = cast(dict[str, Any] | None, group.attrs.get("camera"))
+        camera = None if table is None else Camera.from_table(table)
+        load = float(cast(float, group.attrs["load_kg"]))
+        return Recording(name, series, read_gripper(group), str(group.attrs["motion"]), load, camera)
     except InputError as error:
         raise InputError(f"{path}, recording {name!r}: {error}") from error
     except Exception as error:  # what zarr raises on a damaged store depends on what is damaged

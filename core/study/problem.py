@@ -21,6 +21,7 @@ from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
+from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
 from .objects import build_scenario, check_unstretched
@@ -74,8 +75,10 @@ class Problem:
         effects = [self.effects[name](**c) for name, c in coefficients.items()]
         material, scenario = with_fields(self.material, given), self.scenarios[recording]
         trajectory = rollout(self.simulator, scenario, material, effects, scale, self.time_limit)
-        seen = self.extractor.extract(trajectory.series, trajectory.series.time)
-        return replace(trajectory, series=seen)
+        scene = scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY]), scale)
+        camera = self.recordings[recording].camera if self.recordings[recording].series.unit == "px" else None
+        take = SimulatedTake(trajectory.series, trajectory.vertices, scene, camera)
+        return replace(trajectory, series=self.extractor.observe(take))
 
     def played_as(self) -> dict[str, str]:
         """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
