@@ -67,6 +67,14 @@ def import_files(
             f"the unit and axes of the points (m beside px). {_EACH}",
         ),
     ] = None,
+    camera: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Camera that pixels are of, a TOML or JSON file as muslin render writes it; without it they cannot "
+            f"be compared with a simulation. {_EACH}",
+        ),
+    ] = None,
     correspondence: Annotated[
         bool | None,
         typer.Option(
@@ -101,10 +109,24 @@ def import_files(
         if take:
             raise InputError("--take names takes of a published set; say which set with --dataset")
         options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
-        each = {"start": start, "stop": stop, "motion": motion, "load": load, "gripper": gripper, "name": name}
+        each = {
+            "start": start,
+            "stop": stop,
+            "motion": motion,
+            "load": load,
+            "gripper": gripper,
+            "camera": camera,
+            "name": name,
+        }
         recordings, scenario = _of_files(files, options, each), "fling"
     else:
-        own: dict[str, object] = {"--name": name, "--motion": motion, "--load": load, "--gripper": gripper}
+        own: dict[str, object] = {
+            "--name": name,
+            "--motion": motion,
+            "--load": load,
+            "--gripper": gripper,
+            "--camera": camera,
+        }
         own |= {"--unit": unit, "--up": up != "z", "--correspondence": correspondence is not None}
         if wrong := [option for option, given in own.items() if given]:
             raise InputError(f"{wrong[0]} does not go with --dataset, which knows that itself; leave it out")
@@ -177,6 +199,8 @@ def _summary(recording: Recording) -> str:
         f"{count} points{'' if series.correspondence else ' without correspondence'}, {seen:.1%} seen",
         f"within {extent} {series.unit}{which}",
     ]
+    if recording.camera is not None:
+        parts.append(f"camera of {recording.camera.width} x {recording.camera.height} pixels")
     if recording.gripper is not None:
         parts.append(f"{recording.gripper.grippers} gripper(s)")
     if recording.load:

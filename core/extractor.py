@@ -33,9 +33,9 @@ class KeypointExtractor(ABC):
     def observe(self, take: SimulatedTake) -> PointSeries:
         """Points of a simulated take, as they would have been found in a recording of it.
 
-        By default those of its rendered frames, or of its markers, which are in pixels where a camera measured.
+        By default those of its rendered frames, or of its markers, projected where the recording is in pixels.
         """
         if self.needs_images:
             return self.extract(take.frames(), take.series.time)
-        seen = take.series if take.camera is None else take.projected()
+        seen = take.series if take.camera is None or take.unit == "m" else take.projected()
         return self.extract(seen, seen.time)

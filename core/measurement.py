@@ -84,11 +84,23 @@ class Measurement:
         raise InputError(f"no recording {name!r} in this measurement; it has {', '.join(self.names)}")
 
 
+def check_comparable(recording: Recording) -> None:
+    """Raise :class:`InputError` unless simulated points can be held against these: x, y and z, or a known camera's."""
+    if recording.series.unit == "px" and recording.camera is not None:
+        if recording.series.points.shape[2] != 2:
+            raise InputError(f"recording {recording.name!r} is in pixels, but its points have three coordinates")
+        return
+    check_spatial(recording)
+
+
 def check_spatial(recording: Recording) -> None:
     """Raise :class:`InputError` unless the points are x, y and z in metres, as simulated ones are."""
     if recording.series.unit == "px":
+        known = recording.camera is not None
         raise InputError(
-            f"recording {recording.name!r} is in pixels; only points in metres can be compared without a camera"
+            f"recording {recording.name!r} is in pixels, "
+            + ("but this needs points in metres" if known else "and its camera is not known; ")
+            + ("" if known else "import it again with --camera FILE, or import points in metres")
         )
     if recording.series.points.shape[2] != 3:
         raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")

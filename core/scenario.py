@@ -8,12 +8,14 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .body import Body
+from .camera import Camera
 from .errors import InputError
 from .material import Material, RopeMaterial
 from .measurement import Recording
 from .motion import Motion, inverse, rotate
 from .obstacles import Obstacle
 from .scene import Scene
+from .series import PointUnit
 
 STANDARD_GRAVITY = 9.80665
 #: Clocks [s] and gripper poses [m] that differ by less than this are the same.
@@ -40,6 +42,8 @@ class Scenario:
         start: makes the shape that the object is in before it settles, from the poses that the grippers really
             have then; None: it is in its rest shape. The held vertices sit in their grippers as they start.
         settle: time that the object is given to come to rest before the first observation [s].
+        camera: that looks at it, or None where it is not known.
+        unit: of what is measured: "px" of that camera, or "m" in the world.
     """
 
     name: str
@@ -53,6 +57,8 @@ class Scenario:
     obstacles: tuple[Obstacle, ...] = ()
     start: StartShape | None = None
     settle: float = 0.0
+    camera: Camera | None = None
+    unit: PointUnit = "m"
 
     def __post_init__(self) -> None:
         count = len(self.body.vertices)
@@ -76,14 +82,17 @@ class Scenario:
             raise InputError(f"scenario {self.name!r} says nowhere to hang a load of {self.load:g} kg")
 
     def for_recording(self, recording: Recording) -> "Scenario":
-        """The same object under a recording's motion, load and observation times."""
+        """The same object under a recording's motion, load, camera and observation times."""
         motion = recording.gripper if recording.gripper is not None else self.motion
         if motion.grippers < len(self.grasps):
             raise InputError(
                 f"recording {recording.name!r} has poses of {motion.grippers} grippers, "
                 f"but scenario {self.name!r} holds the object with {len(self.grasps)}"
             )
-        return replace(self, motion=motion, times=recording.series.time, load=recording.load)
+        series = recording.series
+        return replace(
+            self, motion=motion, times=series.time, load=recording.load, camera=recording.camera, unit=series.unit
+        )
 
     def same_rollout(self, other: "Scenario") -> bool:
         """Whether the other one is this one played again, as with takes of one motion."""

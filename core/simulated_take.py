@@ -11,7 +11,7 @@ from .frames import Frames
 from .picture import Appearance
 from .renderer import find_renderer
 from .scene import Scene
-from .series import PointSeries
+from .series import PointSeries, PointUnit
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,13 +22,15 @@ class SimulatedTake:
         series: the markers ``(T, P, 3)`` [m].
         vertices: ``(T, V, 3)`` [m] at the same times.
         scene: in which the object moved.
-        camera: that took the recording that is compared with, or None where that is in metres.
+        camera: that took the recording that is compared with, or None where it is not known.
+        unit: of that recording; what a depth camera measured is in metres.
     """
 
     series: PointSeries
     vertices: FloatArray
     scene: Scene
     camera: Camera | None = None
+    unit: PointUnit = "px"
 
     def projected(self) -> PointSeries:
         """The markers in pixels ``(T, P, 2)``; NaN where they are behind the camera.

@@ -89,4 +89,6 @@ def view_name(view: FloatArray) -> str:
             names.append(("−" if direction[k] < 0 else "") + "xyz"[k])
         else:
             names.append(f"{np.degrees(np.arctan2(direction[1], direction[0])):.0f}° from x".replace("-", "−"))
+    if view.shape[1] == 2 and view[1, 1] < 0:
+        return "as in the picture"
     return f"{names[0]} →   {names[1]} ↑"

@@ -32,6 +32,7 @@ class Snapshot:
         correspondence: measured point p is predicted point p.
         clamped: vertices that cannot be wrong, because they never move.
         outlines: of what stands around the object, lines ``(n, 3)``.
+        in_picture: points are known in the plane y = 0 only, and the mesh in front of and behind it.
     """
 
     title: str
@@ -42,6 +43,7 @@ class Snapshot:
     correspondence: bool = True
     clamped: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
     outlines: tuple[FloatArray, ...] = ()
+    in_picture: bool = False
 
     @property
     def paired(self) -> bool:
@@ -64,7 +66,8 @@ class Snapshot:
             return np.zeros(len(self.vertices))
         places = np.concatenate([self.predicted[known], self.vertices[self.clamped]])
         errors = np.concatenate([errors[known], np.zeros(len(self.clamped))])
-        gaps = np.linalg.norm(self.vertices[:, None] - places[None], axis=2)
+        apart = self.vertices[:, None] - places[None]
+        gaps = np.linalg.norm(apart[..., [0, 2]] if self.in_picture else apart, axis=2)
         scale = max(float(np.ptp(self.vertices, axis=0).max()), 1e-9)
         weights = 1.0 / (gaps + 0.01 * scale) ** 3
         return np.asarray(weights @ errors / weights.sum(axis=1))
@@ -81,9 +84,8 @@ def snapshots(take: Take, after_name: str, frame: int | None = None) -> list[Sna
         flat = None if take.vertices_after is None or take.triangles is None else take.vertices_after[k]
         out.append(Snapshot(f"with {after_name}", take.predicted_after[k], take.measured[k], flat, take.triangles))
     clamped = clamped_vertices(take.vertices)
-    return [
-        _spatial(replace(s, correspondence=take.correspondence, clamped=clamped, outlines=take.outlines)) for s in out
-    ]
+    shown = [replace(s, correspondence=take.correspondence, clamped=clamped, outlines=take.outlines) for s in out]
+    return [_spatial(s, take.unit) for s in shown]
 
 
 def clamped_vertices(vertices: FloatArray | None) -> IntArray:
@@ -93,12 +95,18 @@ def clamped_vertices(vertices: FloatArray | None) -> IntArray:
     return np.flatnonzero(np.ptp(vertices, axis=0).max(axis=1) < 1e-6)
 
 
-def _spatial(s: Snapshot) -> Snapshot:
-    def pad(x: FloatArray) -> FloatArray:  # two-dimensional points lie in the plane y = 0, second axis up
-        return x if x.shape[1] == 3 else np.stack([x[:, 0], np.zeros(len(x)), x[:, 1]], axis=1)
+def _spatial(s: Snapshot, unit: str) -> Snapshot:
+    """Three dimensions of two: points lie in the plane y = 0 with the second axis up; in a picture it points down."""
+    up = -1.0 if unit == "px" else 1.0
+
+    def pad(x: FloatArray) -> FloatArray:
+        if x.shape[1] == 2:
+            return np.stack([x[:, 0], np.zeros(len(x)), up * x[:, 1]], axis=1)
+        return np.stack([x[:, 0], x[:, 2], up * x[:, 1]], axis=1) if unit == "px" else x
 
     vertices = None if s.vertices is None else pad(s.vertices)
-    return replace(s, predicted=pad(s.predicted), measured=pad(s.measured), vertices=vertices)
+    flat = s.measured.shape[1] == 2
+    return replace(s, predicted=pad(s.predicted), measured=pad(s.measured), vertices=vertices, in_picture=flat)
 
 
 def camera(azimuth: float, elevation: float) -> FloatArray:
@@ -110,6 +118,8 @@ def camera(azimuth: float, elevation: float) -> FloatArray:
 def best_view(shots: list[Snapshot]) -> FloatArray:
     """The view from which one sees most of every object and of the error of the first."""
     first = shots[0]
+    if first.in_picture:  # from where it was taken
+        return camera(-0.5 * np.pi, 0.0)
     gaps = first.measured - first.predicted if first.paired else np.zeros((1, 3))
     gaps = gaps[np.isfinite(gaps).all(axis=1)]
     clouds = [s.predicted if s.vertices is None else s.vertices for s in shots]

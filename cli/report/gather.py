@@ -9,6 +9,7 @@ import zarr
 
 from ...core.arrays import FloatArray
 from ...core.errors import MuslinError, StepMissingError
+from ...core.measurement import Recording
 from ...core.measurement_store import read_hidden
 from ...core.store import read
 from ...core.study.objects import obstacles_of
@@ -32,7 +33,9 @@ def gather(study: Study, after: Study | None = None) -> Findings:
         name = ", ".join(e for e in after.config.effects if e not in study.config.effects) or after.path.stem
     else:
         name = _shown_effect(result)
-    takes = [_surrounded(t, study) for t in _takes(compare, diagnose, other, _correspondence(study))]
+    known = _recordings(study)
+    takes = _takes(compare, diagnose, other, {n: r.series.correspondence for n, r in known.items()})
+    takes = [_pictured(_surrounded(t, study), known.get(t.name)) for t in takes]
     if not name or not any(t.after is not None for t in takes):
         takes = [t.without_after() for t in takes]
         name = ""
@@ -79,12 +82,28 @@ def _shown_effect(result: Table | None) -> str:
     return str(candidates[0]["name"]) if candidates and result.get("verdict") != "no-misfit" else ""
 
 
-def _correspondence(study: Study) -> dict[str, bool]:
-    """By recording; empty if the measurement has been moved away since."""
+def _recordings(study: Study) -> dict[str, Recording]:
+    """By name; empty if the measurement has been moved away since."""
     try:
-        return {r.name: r.series.correspondence for r in study.measurement.recordings}
+        return {r.name: r for r in study.measurement.recordings}
     except MuslinError:
         return {}
+
+
+def _pictured(take: Take, recording: Recording | None) -> Take:
+    """Meshes where the camera saw them ``(T, V, 3)``: pixels, and their distance in pixels of its middle."""
+    if take.unit != "px":
+        return take
+    camera = None if recording is None else recording.camera
+
+    def seen(vertices: FloatArray | None) -> FloatArray | None:
+        if vertices is None or camera is None:
+            return None
+        pixels, depth = camera.project(vertices)
+        away = camera.fx * (depth / np.nanmedian(depth) - 1.0)
+        return np.concatenate([pixels, away[..., None]], axis=-1)
+
+    return replace(take, vertices=seen(take.vertices), vertices_after=seen(take.vertices_after))
 
 
 def _surrounded(take: Take, study: Study) -> Take:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..camera import Camera
 from ..errors import InputError, MissingFileError
 from ..measurement import Recording
 from ..motion import Motion
@@ -75,7 +76,8 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
         if not series.valid.any():  # a file that lacks a coordinate throughout has its columns mixed up
             raise InputError("every point is NaN in every frame; check the columns and the marker labels")
         load = options.load if options.load is not None else (take.load or 0.0)
-        return Recording(name, series, gripper, options.motion or take.motion or "", load)
+        camera = None if options.camera is None else Camera.load(options.camera)
+        return Recording(name, series, gripper, options.motion or take.motion or "", load, camera)
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
 

@@ -9,7 +9,7 @@ from ..arrays import FloatArray, IntArray
 from ..body import Body, rope_line
 from ..errors import InputError
 from ..importing.mesh import read_body
-from ..measurement import Recording, check_spatial
+from ..measurement import Recording, check_comparable, check_spatial
 from ..motion import IDENTITY_POSE, Motion, inverse, rotate
 from ..obstacles import Obstacle
 from ..scenario import Scenario, StartShape, bound_markers, marker_weights
@@ -46,8 +46,14 @@ def obstacles_of(table: ScenarioTable, folder: Path) -> tuple[Obstacle, ...]:
     return tuple(o.build(folder) for o in table.obstacles)
 
 
-def build_scenario(table: ScenarioTable, recording: Recording, folder: Path) -> Scenario:
+def build_scenario(table: ScenarioTable, recording: Recording, folder: Path, marked: bool = True) -> Scenario:
     """The scenario of one recording.
+
+    Args:
+        table: of the study.
+        recording: what happened.
+        folder: of the study file.
+        marked: points are markers, each with a place on the object; not those that are found in pictures.
 
     Raises:
         InputError: something in the table cannot be, or does not go with the recording.
@@ -74,10 +80,10 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path) -> 
         start=start,
         settle=base.settle if table.settle is None else table.settle,
     ).for_recording(recording)
-    check_spatial(recording)
+    check_comparable(recording)
     if table.start == "measured":
         return measured_start(plain, recording)
-    return replace(plain, markers=_markers(table.markers, plain, recording))
+    return replace(plain, markers=_markers(table.markers, plain, recording)) if marked else plain
 
 
 def _in_gripper_frame(body: Body, frame: str, motion: Motion, start: float) -> Body:
@@ -132,6 +138,7 @@ def check_unstretched(scenario: Scenario, scale: float, where: str) -> None:
 def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Recording) -> FloatArray:
     count, points = len(scenario.body.vertices), recording.series.points
     if choice == "bound":
+        check_spatial(recording)
         if scenario.settle > 0:
             raise InputError(
                 "[scenario] markers = 'bound' ties each marker to the object where it starts, so it cannot go with "

@@ -76,9 +76,14 @@ class Problem:
         material, scenario = with_fields(self.material, given), self.scenarios[recording]
         trajectory = rollout(self.simulator, scenario, material, effects, scale, self.time_limit)
         scene = scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY]), scale)
-        camera = self.recordings[recording].camera if self.recordings[recording].series.unit == "px" else None
-        take = SimulatedTake(trajectory.series, trajectory.vertices, scene, camera)
+        take = SimulatedTake(trajectory.series, trajectory.vertices, scene, scenario.camera, scenario.unit)
         return replace(trajectory, series=self.extractor.observe(take))
+
+    def points_of(self, recording: str) -> int:
+        """How many points a simulated take of ``recording`` has."""
+        if self.extractor.needs_images:  # found in pictures, as the measured ones
+            return int(self.recordings[recording].series.points.shape[1])
+        return len(self.scenarios[recording].markers)
 
     def played_as(self) -> dict[str, str]:
         """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
@@ -115,7 +120,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     used = {n: measurement[n] for n in (*fit_on, *hold_out)}
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
-    scenarios = {n: build_scenario(config.scenario, r, folder) for n, r in recordings.items()}
+    extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
+    scenarios = {
+        n: build_scenario(config.scenario, r, folder, not extractor.needs_images) for n, r in recordings.items()
+    }
     kind = scenarios[fit_on[0]].body.kind
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
@@ -130,9 +138,11 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     for n, effect in effects.items():
         if (reason := why_powerless(effect, simulator, scenarios[fit_on[0]])) is not None:
             raise InputError(f"[effects.{n}]: {reason}")
-    extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
-    if extractor.needs_images:
-        raise InputError(f"extractor {config.extractor.name!r} needs images, but the measurement holds points")
+    if extractor.needs_images and (blind := [r.name for r in recordings.values() if r.camera is None]):
+        raise InputError(
+            f"[extractor]: {config.extractor.name!r} looks at rendered pictures of what is simulated, but the camera "
+            f"of recording {blind[0]!r} is not known; import it again with --camera FILE, or take another extractor"
+        )
     scales = {1.0, *(bound for p in space if p.name == "scale" for bound in (p.low, p.high))}
     for name, scenario in scenarios.items():
         for scale in sorted(scales):

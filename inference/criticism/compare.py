@@ -122,6 +122,8 @@ def carried(recording: Recording, scenario: Scenario) -> PointSeries:
     if not scenario.grasps or scenario.motion.grippers == 0:
         moved: FloatArray = np.repeat(first[None], len(points), axis=0)
     else:
-        poses = scenario.motion.at(recording.series.time)[:, 0]
-        moved = first[None] + (poses[:, :3] - poses[0, :3])[:, None]
+        gripper: FloatArray = scenario.motion.at(recording.series.time)[:, 0, :3]
+        if recording.camera is not None and recording.series.unit == "px":
+            gripper = recording.camera.project(gripper)[0]
+        moved = first[None] + (gripper - gripper[0])[:, None]
     return replace(recording.series, points=moved)

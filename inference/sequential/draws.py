@@ -58,7 +58,7 @@ class DrawStore:
         empty_draws(draws, "theta", (count, len(problem.space)), ["draw", "parameter"], "unit cube", "float64", np.nan)
         for name in recordings:
             series = problem.recordings[name].series
-            points = len(problem.scenarios[name].markers)
+            points = problem.points_of(name)
             put(draws, f"time_{name}", series.time, [f"time_{name}"], "s")
             shape = (count, series.frames, points, series.points.shape[2])
             dims = ["draw", f"time_{name}", "point", "axis"]

@@ -75,7 +75,8 @@ class FitResult:
                 f"posterior {mean[k]:.4g} ± {spread[k]:.2g}{unit}"
             )
         lines += self._explained(mean, spread)
-        lines.append(f"  noise {self.noise.sd * 1e3:.3g} mm a coordinate ({self.noise.source})")
+        size, unit = (self.noise.sd * 1e3, "mm") if self.noise.unit == "m" else (self.noise.sd, self.noise.unit)
+        lines.append(f"  noise {size:.3g} {unit} a coordinate ({self.noise.source})")
         lines += [f"  warning: {w}" for w in self.warnings]
         return "\n".join(lines)
 

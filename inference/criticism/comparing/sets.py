@@ -94,7 +94,7 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
     worst = int(own.argmax())
     p = float((1 + np.sum(largest >= own.max())) / (_REPLICATES + 1))
     threshold = mean + float(np.quantile(largest, 1 - _LEVEL)) * spread
-    views = two_views(model[seen.any(axis=1)])
+    views = two_views(model[seen.any(axis=1)], held.recording.series.unit)
     flat = [_witness(measured[worst], model[worst], made[:, worst], rows, bandwidth) for rows in views]
     return SetView(
         bandwidth,

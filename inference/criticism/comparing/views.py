@@ -3,18 +3,20 @@
 import numpy as np
 
 from ....core.arrays import FloatArray
+from ....core.series import PointUnit
 
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-def two_views(points: FloatArray) -> FloatArray:
+def two_views(points: FloatArray, unit: PointUnit = "m") -> FloatArray:
     """Right and up ``(W, 2, A)`` of the views of ``points (T, Q, A)``: one of points in a plane, else two.
 
-    Of the three views along the level main directions and from above, the two in which the points cover most.
+    Of the three views along the level main directions and from above, the two in which the points cover most. Of
+    pixels the picture: their second axis points down.
     """
     axes = points.shape[2]
     if axes == 2:
-        return np.eye(2)[None]
+        return np.diag([1.0, -1.0 if unit == "px" else 1.0])[None]
     flat = points.reshape(-1, axes)
     flat = flat[np.isfinite(flat).all(axis=1)]
     level = flat[:, :2] - flat[:, :2].mean(axis=0)

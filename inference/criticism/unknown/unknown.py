@@ -9,6 +9,7 @@ import numpy as np
 from ....core.arrays import FloatArray
 from ....core.effect import Effect
 from ....core.errors import MuslinError
+from ....core.measurement import check_spatial
 from ....core.registry import REGISTRY
 from ....core.store import put, read, storage_errors
 from ....core.study import Problem, SimulationPool, Study
@@ -45,6 +46,8 @@ class Finding(Told):
 def unknown(study: Study) -> Finding:
     """Estimate the missing force on the fitted recordings, and the law it follows; save both in the study's store."""
     began, fit, problem = time.monotonic(), load_fit(study), study.problem
+    for name in problem.fit_on:  # a force in space is not told by pictures of one camera
+        check_spatial(problem.recordings[name])
     offsets, unit = offsets_of(study), read(study.step_results("fit"), "estimate_unit")
     with study.pool(problem) as pool:
         rough = roughness(pool, problem.space, unit, problem.fit_on)
