@@ -100,7 +100,7 @@ def check_spatial(recording: Recording) -> None:
         raise InputError(
             f"recording {recording.name!r} is in pixels, "
             + ("but this needs points in metres" if known else "and its camera is not known; ")
-            + ("" if known else "import it again with --camera FILE, or import points in metres")
+            + ("" if known else "only points in metres can be compared without it; import it again with --camera FILE")
         )
     if recording.series.points.shape[2] != 3:
         raise InputError(f"recording {recording.name!r} has points (x, y) in metres; comparing needs x, y and z")
