@@ -44,6 +44,8 @@ class Effect(ABC):
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
     #: What a simulator must be able to do for it, of :data:`muslin.core.simulator.CAPABILITIES`.
     needs: ClassVar[frozenset[str]] = frozenset()
+    #: Whether it follows from how the object was measured to start, so that it says nothing about other starts.
+    needs_measured_start: ClassVar[bool] = False
     #: Whether it only ever takes energy away from the object.
     dissipative: ClassVar[bool] = False
     #: Whether a diagnosis tries it without being told to.

@@ -26,6 +26,27 @@ StartShape: TypeAlias = Callable[[Body, FloatArray, tuple[IntArray, ...], tuple[
 
 
 @dataclass(frozen=True, eq=False)
+class StartMotion:
+    """How a rope moves as it starts, in the world, at any number of places evenly along it.
+
+    Args:
+        velocities: ``(N, 3)`` [m/s].
+        accelerations: ``(N, 3)`` [m/s2].
+    """
+
+    velocities: FloatArray
+    accelerations: FloatArray
+
+    def along(self, count: int) -> tuple[FloatArray, FloatArray]:
+        """Velocities and accelerations ``(count, 3)`` of that many vertices."""
+        own, wanted = np.arange(len(self.velocities)), np.linspace(0, len(self.velocities) - 1, count)
+        made = [
+            np.stack([np.interp(wanted, own, x) for x in v.T], axis=1) for v in (self.velocities, self.accelerations)
+        ]
+        return made[0], made[1]
+
+
+@dataclass(frozen=True, eq=False)
 class Scenario:
     """Data, not code. The body is given in the frame of the first gripper at its first pose.
 
@@ -42,6 +63,7 @@ class Scenario:
         start: makes the shape that the object is in before it settles, from the poses that the grippers really
             have then; None: it is in its rest shape. The held vertices sit in their grippers as they start.
         settle: time that the object is given to come to rest before the first observation [s].
+        start_motion: how a rope moves as it starts, which then is given no time to settle; None: it is at rest.
         camera: that looks at it, or None where it is not known.
         unit: of what is measured: "px" of that camera, or "m" in the world.
     """
@@ -57,6 +79,7 @@ class Scenario:
     obstacles: tuple[Obstacle, ...] = ()
     start: StartShape | None = None
     settle: float = 0.0
+    start_motion: StartMotion | None = None
     camera: Camera | None = None
     unit: PointUnit = "m"
 
@@ -78,6 +101,8 @@ class Scenario:
             raise InputError(
                 f"scenario {self.name!r}: marker weights are for {self.markers.shape[1]} vertices, mesh has {count}"
             )
+        if self.start_motion is not None and (self.settle > 0 or self.body.kind != "rope"):
+            raise InputError(f"scenario {self.name!r}: only a rope that is given no time to settle starts in motion")
         if self.load > 0 and not len(self.load_vertices):
             raise InputError(f"scenario {self.name!r} says nowhere to hang a load of {self.load:g} kg")
 
@@ -129,7 +154,8 @@ class Scenario:
             loads[self.load_vertices] = self.load / len(self.load_vertices)
         clearance = material.diameter / 2 if isinstance(material, RopeMaterial) else 0.0
         start = None if self.start is None else self.start_vertices(scale, clearance)
-        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start)
+        motion = (None, None) if self.start_motion is None else self.start_motion.along(len(body.vertices))
+        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start, *motion)
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
         """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].

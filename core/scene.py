@@ -23,7 +23,10 @@ class Scene:
         grasps: for every gripper the vertices ``(H_g,)`` that follow its command; may be empty.
         loads: extra point mass on every vertex ``(V,)`` [kg].
         obstacles: what stands around it.
-        start: where the vertices are at time zero, at rest ``(V, 3)`` [m]; None: in the rest shape.
+        start: where the vertices are at time zero ``(V, 3)`` [m]; None: in the rest shape.
+        start_velocities: at time zero ``(V, 3)`` [m/s], of those that are not held; None: at rest.
+        start_accelerations: ``(V, 3)`` [m/s2] that were measured then, which whatever the object's forces are must
+            give; None: not known. Engines do not need them.
     """
 
     body: Body
@@ -33,10 +36,14 @@ class Scene:
     loads: FloatArray
     obstacles: tuple[Obstacle, ...] = ()
     start: FloatArray | None = None
+    start_velocities: FloatArray | None = None
+    start_accelerations: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        if self.start is not None and self.start.shape != self.body.vertices.shape:
-            raise InputError(f"the start has shape {self.start.shape}, the mesh {self.body.vertices.shape}")
+        for what in ("start", "start_velocities", "start_accelerations"):
+            given: FloatArray | None = getattr(self, what)
+            if given is not None and given.shape != self.body.vertices.shape:
+                raise InputError(f"{what} has shape {given.shape}, the mesh {self.body.vertices.shape}")
 
     @cached_property
     def held(self) -> IntArray:

@@ -21,6 +21,7 @@ CAPABILITIES: dict[str, str] = {
     "anisotropy": "make cloth of different stiffness along warp and weft",
     "curved-rest": "make an object whose rest shape is not flat or straight",
     "start-shape": "start from a shape that is not the rest shape",
+    "start-velocity": "start in motion",
     "twist": "make a rope that resists torsion",
     "varying-stiffness": "change the stretch stiffness of elements during a rollout",
     "contact-forces": "tell the forces of the obstacles on the vertices",
@@ -138,6 +139,8 @@ def needed_capabilities(scene: Scene) -> frozenset[str]:
     needed = {kinds[type(o)] for o in scene.obstacles}
     if scene.start is not None and not np.array_equal(scene.start, scene.body.vertices):
         needed.add("start-shape")
+    if scene.start_velocities is not None and scene.start_velocities.any():
+        needed.add("start-velocity")
     material = scene.material
     if isinstance(material, ClothMaterial) and (material.weft_stretch_ratio, material.weft_bending_ratio) != (1, 1):
         needed.add("anisotropy")

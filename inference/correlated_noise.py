@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.arrays import FloatArray
-from .noise import Noise, ar1_noise, fourth_differences, robust_sd
+from ..core.differences import fourth_differences, robust_sd
+from .noise import Noise, ar1_noise
 
 #: Below this correlation from frame to frame noise is taken for white, which roughness tells better.
 WHITE = 0.4

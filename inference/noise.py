@@ -7,6 +7,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
+from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.interpolation import interpolate
 from ..core.measurement import Recording, repeats
@@ -16,20 +17,6 @@ from ..core.study import Problem
 _LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
 #: No noise of repeats is taken to be more correlated from frame to frame.
 _SLOWEST = 0.98
-
-
-def fourth_differences(x: FloatArray) -> FloatArray:
-    """Of ``x (T, ...)``, those that are finite ``(K,)``: white noise of standard deviation s leaves them that same one.
-
-    Smooth motion has next to none.
-    """
-    d = np.diff(x, n=4, axis=0) / np.sqrt(70.0)
-    return np.asarray(d[np.isfinite(d)])
-
-
-def robust_sd(x: FloatArray) -> float:
-    """Standard deviation of normal numbers, whatever a few others among them are; their mean is zero."""
-    return float(1.4826 * np.median(np.abs(x)))
 
 
 def ar1_noise(shape: tuple[int, ...], ar1: float, rng: np.random.Generator) -> FloatArray:

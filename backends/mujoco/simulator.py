@@ -32,6 +32,7 @@ class MujocoSimulator(Simulator):
             "anisotropy",
             "curved-rest",
             "start-shape",
+            "start-velocity",
             "twist",
             "varying-stiffness",
             "contact-forces",

@@ -51,6 +51,8 @@ class MujocoWorld(World):
         self._moved[:] = self._inward(scene.start_positions - scene.body.vertices).ravel()
         if scene.body.kind == "rope" and scene.start is not None:
             self._qpos[count:] = start_twist(scene.body, scene.start)
+        if scene.start_velocities is not None:
+            self._qvel[:count] = self._inward(scene.start_velocities).ravel()
         self._commanded = made.commanded
         self._rest_held = self._rest[self._commanded[: 3 * len(scene.held)]]
         self._target = self._qpos[self._commanded]  # a copy

@@ -33,6 +33,7 @@ class PybulletSimulator(Simulator):
             "anisotropy",
             "curved-rest",
             "start-shape",
+            "start-velocity",
             "varying-stiffness",
             "contact-forces",
         }

@@ -59,7 +59,8 @@ class SoftWorld(World):
         self._substeps = self._substeps_with(None)
 
         self._positions = scene.start_positions.astype(np.float64)
-        self._velocities = np.zeros((count, 3))
+        given = scene.start_velocities
+        self._velocities = np.zeros((count, 3)) if given is None else given.astype(np.float64)
         self._contact = np.zeros((count, 3))
         self._past = np.zeros((2, count, 3))
         friction, radius = scene.material.friction, scene.contact_radius

@@ -1,4 +1,4 @@
-"""A rope that starts as it was measured: through the markers of the first frame, at rest."""
+"""A rope that starts as it was measured: through the markers of the first frame, as fast as they were."""
 
 from dataclasses import replace
 
@@ -6,23 +6,30 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..body import rope_line
+from ..differences import fourth_differences, robust_sd
 from ..errors import InputError
 from ..measurement import Recording, check_spatial
 from ..motion import inverse, rotate
-from ..scenario import Scenario
+from ..scenario import Scenario, StartMotion
+from ..series import PointSeries
 from .starts import GivenShape
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200
+#: Parabolas through the first frames go through so many at least, and through none later than this [s].
+_FEWEST, _LONGEST = 5, 0.3
+#: They fit where they leave no more than this times the noise.
+_WITHIN = 1.5
 
 
 def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     """The scenario of a rope whose markers, in their order along it, reach from its first vertex to its last.
 
-    At rest it is straight and as long as the curve through the markers of the first frame (a natural cubic spline over
-    the chords), along which every marker keeps its place. Length and so mass (at one linear density) are therefore
-    those of this take: takes of one cable differ by as much as their markers are off. It is not given time to settle,
-    which would take it away from where it was seen.
+    In its rest shape it is straight and as long as the curve through the markers of the first frame (a natural cubic
+    spline over the chords), along which every marker keeps its place. Length and so mass (at one linear density) are
+    therefore those of this take: takes of one cable differ by as much as their markers are off. It is not given time to
+    settle, which would take it away from where it was seen, and starts with the velocity of its markers, told by
+    parabolas through their first frames: see :func:`first_motion`.
 
     Raises:
         InputError: not a rope, not x, y and z in metres, or a marker is not seen in the first frame.
@@ -48,7 +55,56 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     evenly = np.linspace(0.0, along[-1], len(along))
     local = np.stack([np.interp(evenly, along, local[:, k]) for k in range(3)], axis=1)
     start = GivenShape(local, along[-1], np.zeros(3))
-    return replace(scenario, body=body, start=start, markers=markers, settle=0.0)
+    motion = first_motion(recording.series, places)
+    return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion)
+
+
+def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
+    """Velocities and accelerations in the first frame, at places evenly along the rope.
+
+    A parabola is fitted to the first frames of every marker, as many as one fits within the noise, by which it is told
+    in turn how far the first frames are from smooth; longer stretches are surer where noise is large. None where the
+    frames are too few to tell.
+
+    Args:
+        series: markers ``(T, P, 3)`` [m].
+        places: of the markers along the rope ``(P,)`` [m].
+    """
+    time = series.time - series.time[0]
+    most = int(np.searchsorted(time, _LONGEST, side="right"))
+    points = series.points[: max(most, _FEWEST)]
+    noise = robust_sd(differences) if len(differences := fourth_differences(points)) else 0.0
+    best: FloatArray | None = None
+    for count in range(_FEWEST, len(points) + 1):
+        found, left = _parabolas(time[:count], points[:count])
+        if best is not None and left > _WITHIN * noise:
+            break
+        best = found
+    if best is None:
+        return None
+    known = np.isfinite(best).all(axis=(0, 2))
+    if not known.any():
+        return None
+    evenly = np.linspace(0.0, places[-1], _FINE)
+    speed, change = (np.stack([np.interp(evenly, places[known], x) for x in v[known].T], axis=1) for v in best)
+    return StartMotion(speed, change)
+
+
+def _parabolas(time: FloatArray, points: FloatArray) -> tuple[FloatArray, float]:
+    """First and second derivatives ``(2, P, 3)`` at time zero, and the root mean square of what is left [m].
+
+    NaN for markers that are seen in too few frames.
+    """
+    out, left = np.full((2, points.shape[1], 3), np.nan), []
+    for p in range(points.shape[1]):
+        seen = np.isfinite(points[:, p]).all(axis=1)
+        if seen.sum() < _FEWEST:
+            continue
+        rows = np.stack([np.ones(seen.sum()), time[seen], 0.5 * time[seen] ** 2], axis=1)
+        solved = np.linalg.lstsq(rows, points[seen, p], rcond=None)[0]
+        out[:, p] = solved[1:]
+        left.append(np.sum((points[seen, p] - rows @ solved) ** 2) / (3 * (seen.sum() - 3)))
+    return out, float(np.sqrt(np.mean(left))) if left else 0.0
 
 
 def _curve(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,7 +1,7 @@
 """What a simulator claims to be able to do beyond its kinds of body, and how that is tried."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -85,6 +85,31 @@ def check_start_shape(make: MakeSimulator, kind: str) -> None:
         end = relax(world, np.zeros((0, 3)), 0.4)
         strain = np.abs(body.edge_lengths(end) / body.edge_lengths(body.vertices) - 1.0).max()
         must(strain < 2e-3, f"started stretched by 2 %, it comes to rest with an edge {strain:.1%} off its rest length")
+
+    with_world(make(), scene, look)
+
+
+def _thrown(kind: str) -> Scene:
+    """Free and without weight, moving as a whole."""
+    scene = free_scene(sample_body(kind), sample_material(kind))
+    return replace(scene, start_velocities=np.tile([0.3, -0.2, 0.1], (len(scene.body.vertices), 1)))
+
+
+def check_start_velocity(make: MakeSimulator, kind: str) -> None:
+    """It starts with the velocities of the scene, and nothing stops it."""
+    scene = _thrown(kind)
+    thrown = scene.start_velocities
+    assert thrown is not None
+
+    def look(world: World) -> None:
+        off = np.abs(world.state().velocities - thrown).max()
+        must(off < EXACT, f"a vertex starts {off:.2g} m/s off the velocity that the scene gives it")
+        steps = round(0.1 / world.time_step)
+        for _ in range(steps):
+            world.step(np.zeros((0, 3)), None)
+        where = scene.body.vertices + steps * world.time_step * thrown
+        off = np.abs(world.state().positions - where).max()
+        must(off < 1e-4, f"thrown without weight it is {1e3 * off:.2g} mm from where it must be after 0.1 s")
 
     with_world(make(), scene, look)
 
@@ -180,6 +205,7 @@ ABILITIES: tuple[Ability, ...] = (
         ("cloth", "rope"),
     ),
     Ability("start-shape", {"starts away from its rest shape": check_start_shape}, _displaced),
+    Ability("start-velocity", {"starts in motion": check_start_velocity}, _thrown),
     Ability("twist", {"resists torsion": check_twist}, None, ("rope",), frozenset({"curved-rest"})),
     Ability("varying-stiffness", {"changes its stiffness when told": check_varying_stiffness}),
 )

@@ -62,7 +62,9 @@ class ReferenceWorld(World):
         self._held = scene.held
         self._free = np.setdiff1d(np.arange(len(self.masses)), scene.held)
         self._free_dofs, self._held_dofs = _dofs(self._free), _dofs(scene.held)
-        self._x, self._v = scene.start_positions.astype(np.float64), np.zeros_like(body.vertices)
+        given = scene.start_velocities
+        self._x = scene.start_positions.astype(np.float64)
+        self._v = np.zeros_like(body.vertices) if given is None else given.astype(np.float64)
         self._contacts = np.zeros_like(body.vertices)
 
     def state(self) -> State:

@@ -1,10 +1,11 @@
 """What makes the numbers of a fit doubtful, found out with a few more rollouts."""
 
 from ...core.arrays import FloatArray
+from ...core.differences import fourth_differences, robust_sd
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import SimulationPool, Task
-from ..noise import Noise, fourth_differences, robust_sd
+from ..noise import Noise
 from ..roughness import roughness, unrepeatable
 
 

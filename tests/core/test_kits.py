@@ -62,6 +62,8 @@ class FaultyWorld(ReferenceWorld):
             self._x = self._x[::-1].copy()
         if fault == "stiffness":
             self._elasticity = 1.1 * self._elasticity
+        if fault == "at rest":
+            self._v = np.zeros_like(self._v)
         if fault == "straight rest":
             self._gravity = self._gravity + np.array([0.0, 0.3, 0.3])
         if fault == "friction of one":
@@ -133,6 +135,7 @@ FAULTS: dict[str, dict[str, str]] = {
     "is stiffer along the weft if told so": {"anisotropy": "along the warp as without"},
     "keeps a curved rest shape": {"straight rest": "without any force"},
     "starts away from its rest shape": {"rest is start": "off its rest length"},
+    "starts in motion": {"at rest": "off the velocity", "damping a step": "thrown without weight"},
     "changes its stiffness when told": {"stiffness of all": "near the grasp"},
 }
 
@@ -182,7 +185,7 @@ def test_what_is_not_claimed_must_be_refused() -> None:
     refusals = [c for c in simulator_checks(TakesAll) if "refused" in c.title]
     told = dict(run_all(refusals))
     assert told["solid: refused, as it is not claimed"] == "check() lets a solid pass, which is not in object_kinds"
-    needs = ("table", "cylinder", "static-mesh", "anisotropy", "curved-rest", "start-shape")
+    needs = ("table", "cylinder", "static-mesh", "anisotropy", "curved-rest", "start-shape", "start-velocity")
     assert len(told) == 2 + len(needs)
     for need in needs:
         complaint = told[f"cloth: refused where it needs {need!r}, which is not claimed"]

@@ -12,7 +12,7 @@ from muslin.core.motion import Motion
 from muslin.core.refinement import refined
 from muslin.core.scenario import Scenario
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import measured_start
+from muslin.core.scenarios.measured import first_motion, measured_start
 from muslin.core.series import PointSeries
 
 TURN = np.array([np.cos(0.3), 0.0, np.sin(0.3), 0.0])
@@ -53,7 +53,7 @@ def test_it_is_for_points_in_space() -> None:
     scenario, recording = recorded(arc(np.linspace(-1.0, 1.0, 9)))
     series = recording.series
     pixels = replace(recording, series=PointSeries(series.time, series.points[..., :2], "px"))
-    with pytest.raises(InputError, match="recording 'take' is in pixels, .* only points in metres"):
+    with pytest.raises(InputError, match=r"recording 'take' is in pixels, .* only points in metres"):
         measured_start(scenario, pixels)
     flat = replace(recording, series=PointSeries(series.time, series.points[..., :2]))
     with pytest.raises(InputError, match=r"recording 'take' has points \(x, y\) in metres"):
@@ -78,3 +78,31 @@ def test_what_cannot_be_is_said() -> None:
     points[3] = points[4]
     with pytest.raises(InputError, match="markers 3 and the next are at one place"):
         measured_start(*recorded(points))
+
+
+@pytest.mark.parametrize(("noise", "slack"), [(0.0, 1e-6), (2e-5, 0.02), (1e-3, 0.06)])
+def test_it_starts_as_fast_as_its_markers(noise: float, slack: float) -> None:
+    """Markers on parabolas: the more noise, the longer the stretch from which their velocity is told."""
+    places = np.linspace(-1.0, 1.0, 9)
+    time = np.arange(0.0, 1.0, 0.01)
+    velocity = np.array([0.2, -0.5, 0.3]) * (1 + places[:, None])
+    path = arc(places) + time[:, None, None] * velocity + 0.5 * time[:, None, None] ** 2 * np.array([0.0, 0.0, -2.0])
+    path += np.random.default_rng(0).normal(0, noise, path.shape)
+    motion = first_motion(PointSeries(time, path), places - places[0])
+    assert motion is not None
+    speeds, changes = motion.along(9)
+    assert np.abs(speeds - velocity).max() < slack
+    assert np.sqrt(np.mean((changes - [0.0, 0.0, -2.0]) ** 2)) < 20 * slack
+
+
+def test_a_marker_that_is_lost_at_first_moves_with_its_neighbours() -> None:
+    places, time = np.linspace(-1.0, 1.0, 9), np.arange(0.0, 0.5, 0.01)
+    path = arc(places) + time[:, None, None] * np.array([0.4, 0.0, 0.0])
+    path[1:40, 3] = np.nan
+    motion = first_motion(PointSeries(time, path), places - places[0])
+    assert motion is not None
+    np.testing.assert_allclose(motion.velocities, np.tile([0.4, 0.0, 0.0], (len(motion.velocities), 1)), atol=1e-9)
+
+
+def test_two_frames_tell_no_velocity() -> None:
+    assert measured_start(*recorded(arc(np.linspace(-1.0, 1.0, 9)))).start_motion is None

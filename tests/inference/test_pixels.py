@@ -48,7 +48,7 @@ def test_the_camera_is_kept_with_the_recording(tmp_path: Path) -> None:
 
 def test_pixels_without_their_camera_are_refused(tmp_path: Path) -> None:
     blind = Measurement(tuple(replace(r, camera=None) for r in seen().recordings))
-    with pytest.raises(InputError, match="camera is not known; .* import it again with --camera FILE"):
+    with pytest.raises(InputError, match=r"camera is not known; .* import it again with --camera FILE"):
         build_problem(parse_config(small_config(), "test"), blind)
 
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from muslin.core.differences import fourth_differences
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
-from muslin.inference.noise import Noise, _from_repeats, fourth_differences
+from muslin.inference.noise import Noise, _from_repeats
 from muslin.inference.residuals import Offsets, failed, residual
 
 TIME = np.arange(0, 2, 0.02)
