@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..camera import Camera
 from ..effect import Effect
 from ..errors import InputError, RolloutFailed
 from ..extractor import KeypointExtractor
@@ -76,9 +77,15 @@ class Problem:
         material, scenario = with_fields(self.material, given), self.scenarios[recording]
         trajectory = rollout(self.simulator, scenario, material, effects, scale, self.time_limit)
         scene = scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY]), scale)
-        camera = self.recordings[recording].camera if self.recordings[recording].series.unit == "px" else None
-        take = SimulatedTake(trajectory.series, trajectory.vertices, scene, camera)
+        take = SimulatedTake(trajectory.series, trajectory.vertices, scene, self._camera(recording))
         return replace(trajectory, series=self.extractor.observe(take))
+
+    def _camera(self, recording: str) -> Camera | None:
+        """Who looks at a simulated take: none where only points in metres are compared, or nothing was measured."""
+        measured = self.recordings.get(recording)
+        if measured is None or not (measured.series.unit == "px" or self.extractor.needs_images):
+            return None
+        return measured.camera
 
     def played_as(self) -> dict[str, str]:
         """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
