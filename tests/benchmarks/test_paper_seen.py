@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from paper_scene import SETTINGS
-from paper_seen import Detector, chamfer
+from paper_seen import Detector
 
 from muslin.core.body import Body, rope_line
 from muslin.core.camera import Camera
@@ -19,20 +19,6 @@ CAMERA = Camera.look_at(np.array([0.0, -1.0, 0.0]), np.zeros(3))
 
 def scene(body: Body) -> Scene:
     return Scene(body, RopeMaterial(), np.zeros(3), (), np.zeros(len(body.vertices)))
-
-
-def square(left: int, top: int, side: int = 6) -> np.ndarray:
-    mask = np.zeros((1, 40, 40), bool)
-    mask[0, top : top + side, left : left + side] = True
-    return mask
-
-
-def test_the_distance_of_masks_is_chamfers() -> None:
-    """A square moved by d < side has d columns at 1 to d pixels from the other; one in it, half of its rim's."""
-    assert chamfer(square(5, 5), square(5, 5)) == 0.0
-    assert chamfer(square(5, 5), square(7, 5)) == pytest.approx((1 + 2) / 6)
-    assert chamfer(square(5, 5), square(6, 6, 4)) == pytest.approx(0.5 * (16 + 4 * np.sqrt(2)) / 36)
-    assert chamfer(square(5, 5), np.zeros((1, 40, 40), bool)) == pytest.approx(np.hypot(40, 40))
 
 
 @pytest.mark.parametrize("name", SETTINGS)
