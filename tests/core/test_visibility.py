@@ -30,7 +30,7 @@ def seen(body: Body, points: list[list[float]], *obstacles: Obstacle, camera: Ca
 
 
 def test_a_point_behind_the_cloth_or_a_spool_is_not_seen() -> None:
-    sheet = Body("cloth", SHEET.vertices + [0.0, 0.0, 0.1], SHEET.elements)  # its middle at the origin
+    sheet = Body("cloth", SHEET.vertices + np.array([0.0, 0.0, 0.1]), SHEET.elements)  # its middle at the origin
     points = [[0.0, 0.1, 0.0], [0.0, -0.1, 0.0], [0.05, 0.0, 0.05], [0.3, 0.1, 0.0], [5.0, 0.0, 0.0], [0.0, -2.0, 0.0]]
     spool = Cylinder(np.array([0.0, -0.3, 0.0]), np.array([0.0, 0.0, 1.0]), 0.02, 1.0)
     assert seen(sheet, points) == [False, True, True, True, False, False]
@@ -40,7 +40,7 @@ def test_a_point_behind_the_cloth_or_a_spool_is_not_seen() -> None:
 def test_a_solid_a_static_mesh_and_a_table_hide() -> None:
     block = solid_box(np.full(3, -0.05), np.full(3, 0.05), (3, 3, 3))
     assert seen(block, [[0.0, -0.05, 0.0], [0.0, 0.05, 0.0], [0.2, 0.0, 0.0]]) == [True, False, True]
-    wall = StaticMesh(block.vertices + [0.2, -0.3, 0.0], block.triangles)
+    wall = StaticMesh(block.vertices + np.array([0.2, -0.3, 0.0]), block.triangles)
     assert seen(block, [[0.0, -0.05, 0.0], [0.28, 0.0, 0.0]], wall) == [True, False]
     high = Camera.look_at(np.array([0.0, -1.0, 0.5]), np.zeros(3))
     points = [[0.3, 0.0, 0.0], [0.3, 0.0, -0.013], [0.3, 0.0, -0.1]]
@@ -62,7 +62,7 @@ def test_what_is_seen_is_what_is_drawn_at_that_depth(kind: str) -> None:
     rng = np.random.default_rng(3)
     if kind == "cloth":
         body = cloth_grid(0.3, 0.3, 13, 13)
-        vertices: FloatArray = body.vertices + [0.0, 0.0, 0.15]
+        vertices: FloatArray = body.vertices + np.array([0.0, 0.0, 0.15])
         fold = np.abs(vertices[:, 0])
         vertices = np.stack([0.9 * fold, vertices[:, 0] * 0.4, vertices[:, 2]], axis=1)  # a V, seen from its side
     else:
