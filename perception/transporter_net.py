@@ -29,11 +29,10 @@ class Transporter(nn.Module):
         super().__init__()
         deep = 4 * width
         self.features = _encoder(width)
-        self.detector = nn.Sequential(_encoder(width), nn.Conv2d(deep, keypoints, 1))
-        with (
-            torch.no_grad()
-        ):  # a heatmap that begins flat has its place in the middle of every picture, and stays there
-            self.detector[1].weight.mul_(_SHARP)
+        peaks = nn.Conv2d(deep, keypoints, 1)
+        with torch.no_grad():  # a heatmap that begins flat has its place in the middle of every picture, and may stay
+            peaks.weight.copy_(_SHARP * peaks.weight)
+        self.detector = nn.Sequential(_encoder(width), peaks)
         self.refiner = nn.Sequential(
             _layer(deep, deep),
             nn.Upsample(scale_factor=2.0, mode="bilinear"),
