@@ -9,7 +9,19 @@ from typing import Annotated, NoReturn
 import typer
 
 from ..core.version import __version__
-from . import bench, calibrate, inspection, next, recordings, render, simulators, starting, steps, unknown
+from . import (
+    bench,
+    calibrate,
+    inspection,
+    mask_distance,
+    next,
+    recordings,
+    render,
+    simulators,
+    starting,
+    steps,
+    unknown,
+)
 from .failure import INTERRUPTED, describe, usage_text
 
 app = typer.Typer(
@@ -42,7 +54,19 @@ def _options(
     """Options of every command."""
 
 
-for _group in (recordings, starting, steps, next, unknown, calibrate, inspection, render, bench, simulators):
+for _group in (
+    recordings,
+    starting,
+    steps,
+    next,
+    unknown,
+    calibrate,
+    inspection,
+    render,
+    mask_distance,
+    bench,
+    simulators,
+):
     _group.add_to(app)
 
 

@@ -39,3 +39,17 @@ class KeypointExtractor(ABC):
             return self.extract(take.frames(), take.series.time)
         seen = take.series if take.camera is None or take.unit == "m" else take.projected()
         return self.extract(seen, seen.time)
+
+    @property
+    def uses_markers(self) -> bool:
+        """Whether :meth:`observe` gives the markers of the scenario, which then must be those of the recording."""
+        return not self.needs_images
+
+    def points_of(self, vertices: int, markers: int, measured: int) -> int:
+        """How many points :meth:`observe` gives.
+
+        Args:
+            vertices, markers: how many the simulated object has.
+            measured: how many this extractor found in the recording.
+        """
+        return markers if self.uses_markers else measured

@@ -152,6 +152,7 @@ _EXTRAS = {
     "trimesh": "mesh",
     "meshio": "mesh",
     "cv2": "perception",
+    "safetensors": "perception",
 }
 
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .arrays import FloatArray
+from .arrays import BoolArray, FloatArray
 from .camera import Camera
 from .errors import InputError
 from .frames import Frames
-from .picture import Appearance
+from .picture import OBJECT, Appearance
 from .renderer import find_renderer
 from .scene import Scene
 from .series import PointSeries, PointUnit
@@ -46,6 +46,12 @@ class SimulatedTake:
         with find_renderer(renderer).open(self.scene, appearance) as view:
             made = [view.render(v, camera) for v in self.vertices]
         return Frames(np.stack([f.rgb for f in made]), np.stack([f.depth for f in made]), camera=camera)
+
+    def masks(self, renderer: str = "auto") -> BoolArray:
+        """The pixels of the object ``(T, H, W)`` in every frame, whatever it looks like."""
+        camera = self._camera("rendered")
+        with find_renderer(renderer).open(self.scene) as view:
+            return np.stack([view.render(v, camera).segmentation == OBJECT for v in self.vertices])
 
     def _camera(self, what: str) -> Camera:
         if self.camera is None:

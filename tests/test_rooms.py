@@ -18,6 +18,7 @@ ENGINES = (
     "torch",
     "scipy",
     "cv2",
+    "safetensors",
     "trimesh",
     "matplotlib",
     "jinja2",

@@ -77,13 +77,18 @@ class Problem:
         trajectory = rollout(self.simulator, scenario, material, effects, scale, self.time_limit)
         scene = scenario.scene(material, np.array([0.0, 0.0, -STANDARD_GRAVITY]), scale)
         take = SimulatedTake(trajectory.series, trajectory.vertices, scene, scenario.camera, scenario.unit)
-        return replace(trajectory, series=self.extractor.observe(take))
+        seen = self.extractor.observe(take)
+        if seen.unit != scenario.unit:
+            raise InputError(
+                f"[extractor]: {self.extractor.name!r} gives points in {seen.unit}, but recording {recording!r} is in "
+                f"{scenario.unit}; take another extractor, or extract the recording's points with this one"
+            )
+        return replace(trajectory, series=seen)
 
     def points_of(self, recording: str) -> int:
         """How many points a simulated take of ``recording`` has."""
-        if self.extractor.needs_images:  # found in pictures, as the measured ones
-            return int(self.recordings[recording].series.points.shape[1])
-        return len(self.scenarios[recording].markers)
+        scenario, measured = self.scenarios[recording], self.recordings[recording].series.points.shape[1]
+        return self.extractor.points_of(len(scenario.body.vertices), len(scenario.markers), measured)
 
     def played_as(self) -> dict[str, str]:
         """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
@@ -121,9 +126,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
     extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
-    scenarios = {
-        n: build_scenario(config.scenario, r, folder, not extractor.needs_images) for n, r in recordings.items()
-    }
+    scenarios = {n: build_scenario(config.scenario, r, folder, extractor.uses_markers) for n, r in recordings.items()}
     kind = scenarios[fit_on[0]].body.kind
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}

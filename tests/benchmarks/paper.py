@@ -39,7 +39,7 @@ from muslin.core.registry import REGISTRY
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Whose sources a result depends on.
-ROOMS = ("core", "backends", "inference", "tests/benchmarks")
+ROOMS = ("core", "backends", "perception", "inference", "tests/benchmarks")
 METHODS = (
     "bayessim-mdnn",
     "bayessim-mdrff",

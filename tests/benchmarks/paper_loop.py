@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from paper_scene import Reality, Setting
-from paper_seen import Detector, Space, chamfer, masks
+from paper_seen import Detector, Space
 
 from muslin.core.arrays import BoolArray, FloatArray
 from muslin.core.camera import Camera
@@ -17,6 +17,7 @@ from muslin.core.renderer import find_renderer
 from muslin.core.rollout import Trajectory
 from muslin.core.study import SimulationPool, Task
 from muslin.inference.sequential.proposals import Kind, Proposals
+from muslin.perception.chamfer import mask_chamfer, masks
 
 #: Methods that are trained once, on a batch of draws from the prior; the others in rounds.
 BULK = ("nn-bulk", "gp-bulk")
@@ -143,7 +144,7 @@ class Stage:
         _, real = self.real(reality, seed)
         found = [v for v in self.simulate(units) if v is not None]
         apart = [
-            chamfer(masks(self._renderer, self._scene, self.camera, v[::DRAWN_EVERY].astype(float)), real)
+            mask_chamfer(masks(self._renderer, self._scene, self.camera, v[::DRAWN_EVERY].astype(float)), real).mean()
             for v in found
         ]
         failed = len(units) - len(found)
