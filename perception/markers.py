@@ -8,6 +8,7 @@ import numpy.typing as npt
 from ..core.arrays import FloatArray
 from ..core.errors import InputError
 from ..core.extractor import KeypointExtractor
+from ..core.frames import Frames
 from ..core.series import PointSeries
 
 
@@ -17,7 +18,7 @@ class MarkerExtractor(KeypointExtractor):
     name: ClassVar[str] = "markers"
     needs_images: ClassVar[bool] = False
 
-    def extract(self, source: PointSeries | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
+    def extract(self, source: PointSeries | Frames | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
         """The series itself; frames are an :class:`InputError`, markers cannot be found in images."""
         if not isinstance(source, PointSeries):
             raise InputError("extractor 'markers' takes measured points, not images")
