@@ -152,6 +152,9 @@ _EXTRAS = {
     "trimesh": "mesh",
     "meshio": "mesh",
     "cv2": "perception",
+    "av": "perception",
+    "pyarrow": "robotics",
+    "rosbags": "robotics",
 }
 
 
