@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..core.errors import BrokenPluginError, InputError, MissingFileError, StoreError
+from ..core.errors import InputError, MissingFileError, StoreError
+from ..core.optional import library
 from ..core.picture import DepthImage, Image
 
 #: Most pixels a side of a texture; larger ones are shrunk.
@@ -16,13 +17,7 @@ DEEPEST = 65.535
 
 
 def _cv2() -> Any:
-    try:
-        import cv2
-    except ImportError as error:
-        raise BrokenPluginError(
-            f"images need OpenCV, which cannot be loaded ({error}); install it with: pip install 'muslin[perception]'"
-        ) from error
-    return cv2
+    return library("cv2", "images", "perception")
 
 
 def read_image(path: Path, size: tuple[int, int] | None = None) -> Image:

@@ -12,6 +12,8 @@ from ..core.version import __version__
 from . import (
     bench,
     calibrate,
+    camera,
+    extracting,
     inspection,
     mask_distance,
     next,
@@ -56,6 +58,8 @@ def _options(
 
 for _group in (
     recordings,
+    camera,
+    extracting,
     starting,
     steps,
     next,

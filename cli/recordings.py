@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -17,9 +17,13 @@ from ..core.measurement_store import save_measurement
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS
 from .console import command, next_step, say
+from .per_file import once_or_each, per_file
+from .videos import all_videos, import_videos
 
-T = TypeVar("T")
-_FILES = "markers.c3d, points.npz or track.csv; with --dataset the one file or folder of that set."
+_FILES = (
+    "markers.c3d, points.npz or track.csv; video.mp4, a folder of pictures, a LeRobot data set or an MCAP or ROS bag; "
+    "with --dataset the one file or folder of that set."
+)
 _EACH = "Once for all files (takes of a set), or once each, in their order."
 
 
@@ -62,17 +66,19 @@ def import_files(
     gripper: Annotated[
         list[Path] | None,
         typer.Option(
+            "--gripper",
+            "--poses",
             metavar="FILE.csv",
-            help="Gripper poses, for C3D and CSV: columns time,gripper,x,y,z and optionally qw,qx,qy,qz; positions in "
-            f"the unit and axes of the points (m beside px). {_EACH}",
+            help="Gripper poses (C3D, CSV, videos): columns time,gripper,x,y,z and optionally qw,qx,qy,qz; positions "
+            f"in the unit and axes of the points (m beside px). {_EACH}",
         ),
     ] = None,
     camera: Annotated[
         list[Path] | None,
         typer.Option(
-            metavar="FILE",
-            help="Camera that pixels are of, a TOML or JSON file as muslin render writes it; without it they cannot "
-            f"be compared with a simulation. {_EACH}",
+            metavar="CAMERA.toml",
+            help="The camera of the frames, or of points in pixels, as muslin calibrate-camera writes it; a distorted "
+            f"picture is undistorted. {_EACH}",
         ),
     ] = None,
     correspondence: Annotated[
@@ -87,11 +93,64 @@ def import_files(
         typer.Option(metavar="NAME", help="FILE is a file or folder of this published set; see: muslin plugins"),
     ] = None,
     take: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="With --dataset: a take to read; default all of them.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="With --dataset: a take to read; default all of them. Of a LeRobot data set: an episode, or all.",
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATE", help="Video: frames a second, where the files do not say the times, or say them wrongly."
+        ),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(metavar="WxH", help="Video: scale frames, and the camera with them, to these pixels.")
+    ] = None,
+    offset: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SECONDS|auto",
+            help="Video: add this to the time of the frames to have that of the poses; auto finds it from the motion "
+            f"in the pictures. {_EACH}",
+        ),
+    ] = None,
+    depth: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FOLDER", help=f"Video: 16-bit pictures of depth in mm, 0 for holes, one a frame. {_EACH}"
+        ),
+    ] = None,
+    robot: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FOLDER", help=f"Video: masks, not zero where the robot is, one a frame. {_EACH}"),
+    ] = None,
+    image: Annotated[
+        str | None, typer.Option(metavar="NAME", help="LeRobot: which camera. Bag: which topic of images.")
+    ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="LeRobot: the feature that holds the gripper's pose. Bag: its topic, /tf:FRAME for a transform. none: "
+            "no poses.",
+        ),
+    ] = None,
+    pose_columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z[,QW,QX,QY,QZ]",
+            help="LeRobot: entries of that feature, by name or number from 0; once a gripper.",
+        ),
+    ] = None,
+    clock: Annotated[
+        str | None,
+        typer.Option(metavar="header|log", help="Bag: time of measuring (default) or of writing."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a measurement that is there already.")] = False,
 ) -> None:
-    """Import recorded points: several files become several recordings of one measurement.
+    """Import recorded points or videos: several files become several recordings of one store.
 
     C3D: labelled markers, in the unit that the file names.
 
@@ -101,32 +160,34 @@ def import_files(
     CSV, one row an observation: columns time,point,x,y and optionally z, recording; a missing row is a
     point not seen.
 
+    Videos: a file, or a folder of PNG or JPEG files with --fps or a file time.csv (a time in s a line), also as
+    muslin render writes it; a LeRobot data set; an MCAP file or ROS bag. They become frames on the clock of the
+    gripper poses, from which muslin extract takes points.
+
     A published set (--dataset): all of its takes or those named, with --start and --stop once or once a take.
     """
     if output.exists() and not force:  # said before a long file is read
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
+    videos: dict[str, Any] = {"fps": fps, "size": size, "offset": offset, "depth": depth, "robot": robot}
+    videos |= {"image": image, "pose": pose, "pose-columns": pose_columns, "clock": clock}
+    each = {"start": start, "stop": stop, "motion": motion, "load": load, "gripper": gripper, "name": name}
+    each["camera"] = camera
+    seen = dataset is None and all_videos(files)
+    if not seen and (wrong := [f"--{option}" for option, given in videos.items() if given is not None]):
+        raise InputError(f"{wrong[0]} goes with videos, and {files[0]} is imported as points; leave it out")
+    if seen:
+        if correspondence is not None:
+            raise InputError("--correspondence goes with points; of a video, the extractor says it")
+        import_videos(files, output, unit, up, each, videos, take or [], force)
+        return
     if dataset is None:
         if take:
             raise InputError("--take names takes of a published set; say which set with --dataset")
         options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
-        each = {
-            "start": start,
-            "stop": stop,
-            "motion": motion,
-            "load": load,
-            "gripper": gripper,
-            "camera": camera,
-            "name": name,
-        }
         recordings, scenario = _of_files(files, options, each), "fling"
     else:
-        own: dict[str, object] = {
-            "--name": name,
-            "--motion": motion,
-            "--load": load,
-            "--gripper": gripper,
-            "--camera": camera,
-        }
+        own: dict[str, object] = {"--name": name, "--motion": motion, "--load": load, "--gripper": gripper}
+        own["--camera"] = camera
         own |= {"--unit": unit, "--up": up != "z", "--correspondence": correspondence is not None}
         if wrong := [option for option, given in own.items() if given]:
             raise InputError(f"{wrong[0]} does not go with --dataset, which knows that itself; leave it out")
@@ -135,7 +196,7 @@ def import_files(
     save_measurement(measurement, output, overwrite=force)
     say(f"wrote {output}")
     for recording in measurement.recordings:
-        say("  " + _summary(recording))
+        say("  " + summary(recording))
     next_step(
         command("new", "study.toml", "--measurement", output, "--scenario", scenario, "--simulator", "mujoco"),
         note=f"scenarios: {', '.join(PRESETS)}",
@@ -146,15 +207,11 @@ def _of_files(
     files: Sequence[Path], options: ImportOptions, each: Mapping[str, Sequence[Any] | None]
 ) -> list[Recording]:
     """What the files hold; ``each`` are options that are given once, or once a file."""
-    names = each["name"]
-    if names and len(names) == 1 and len(files) > 1:
-        raise InputError(f"--name is given once for {len(files)} files; give it once a file, in their order")
-    told = {option: _each(values, len(files), f"--{option}", "file") for option, values in each.items()}
-    recordings: list[Recording] = []
-    for k, file in enumerate(files):
-        own: dict[str, Any] = {option: values[k] for option, values in told.items()}
-        recordings += import_file(file, replace(options, **own))
-    return recordings
+    return [
+        r
+        for file, own in zip(files, per_file(each, len(files)), strict=True)
+        for r in import_file(file, replace(options, **own))
+    ]
 
 
 def _of_dataset(
@@ -172,21 +229,13 @@ def _of_dataset(
             say(str(warning.message))
         else:
             warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    starts = _each(start, len(recordings), "--start", "take")
-    stops = _each(stop, len(recordings), "--stop", "take")
+    starts = once_or_each(start, len(recordings), "--start", "take")
+    stops = once_or_each(stop, len(recordings), "--stop", "take")
     return [cropped(r, a, b) for r, a, b in zip(recordings, starts, stops, strict=True)]
 
 
-def _each(values: Sequence[T] | None, count: int, option: str, what: str) -> Sequence[T | None]:
-    """One value for each of ``count`` files or takes."""
-    if not values or len(values) == 1:
-        return [values[0] if values else None] * count
-    if len(values) != count:
-        raise InputError(f"{option} is given {len(values)} times for {count} {what}s; give it once, or once a {what}")
-    return values
-
-
-def _summary(recording: Recording) -> str:
+def summary(recording: Recording) -> str:
+    """One line about a recording."""
     series = recording.series
     frames, count, axes = series.points.shape
     seen = float(np.mean(np.isfinite(series.points).any(axis=2)))

@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from ..core.errors import InputError
+from ..core.importing.video import is_video
 from ..core.measurement import Measurement
 from ..core.measurement_store import load_measurement
 from ..core.registry import REGISTRY
@@ -85,7 +86,7 @@ def new(
         if name not in REGISTRY.names(kind):
             REGISTRY.get(kind, name)  # says what is installed, and which is nearest
     check_output(study, force)
-    if measurement.suffix in (".npz", ".csv", ".c3d") and measurement.is_file():
+    if (measurement.suffix in (".npz", ".csv", ".c3d") or is_video(measurement)) and measurement.is_file():
         raise InputError(
             f"{measurement} is not a measurement; first: muslin import {measurement} -o {measurement.stem}.zarr"
         )

@@ -161,28 +161,46 @@ class Camera:
 
     def save(self, path: Path) -> None:
         """Write a camera file, JSON if its name ends so, else TOML."""
-        table = self.as_table()
-        write_text(path, json.dumps(table, indent=1) + "\n" if path.suffix == ".json" else tomli_w.dumps(table))
+        write_camera_file(path, self.as_table())
+
+    def scaled(self, width: int, height: int) -> "Camera":
+        """The camera of pictures that were scaled to ``width`` x ``height`` [px]: the same edges, other pixels."""
+        a, b = width / self.width, height / self.height
+        middle = ((self.cx + 0.5) * a - 0.5, (self.cy + 0.5) * b - 0.5)
+        return Camera(width, height, self.fx * a, self.fy * b, *middle, self.pose)
 
     @classmethod
     def load(cls, path: Path) -> "Camera":
-        """Read a camera file.
+        """Read a camera file, leaving out the distortion of its lens; see :class:`~muslin.core.lens.Lens`.
 
         Raises:
             MissingFileError: there is none.
             InputError: it is not one; the message names the key.
         """
-        if not path.is_file():
-            raise MissingFileError(f"there is no camera file {path}")
-        try:
-            text = path.read_text(encoding="utf-8")
-            table = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
-        except ValueError as error:  # of either format, and bytes that are no text
-            raise InputError(f"camera file {path} cannot be read: {error}") from error
+        table = read_camera_file(path)
         try:
             return cls.from_table(table)
         except InputError as error:
             raise InputError(f"camera file {path}: {error}") from error
+
+
+def read_camera_file(path: Path) -> dict[str, Any]:
+    """The keys of a camera file, not yet checked."""
+    if not path.is_file():
+        raise MissingFileError(f"there is no camera file {path}")
+    try:
+        text = path.read_text(encoding="utf-8")
+        table = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+    except ValueError as error:  # of either format, and bytes that are no text
+        raise InputError(f"camera file {path} cannot be read: {error}") from error
+    if not isinstance(table, dict):
+        raise InputError(f"camera file {path} must hold keys and values, as {', '.join(_File.model_fields)}")
+    return table
+
+
+def write_camera_file(path: Path, table: Mapping[str, Any]) -> None:
+    """Write the keys of a camera file, as JSON if its name ends so, else as TOML."""
+    write_text(path, json.dumps(table, indent=1) + "\n" if path.suffix == ".json" else tomli_w.dumps(table))
 
 
 class _File(BaseModel):
@@ -198,6 +216,7 @@ class _File(BaseModel):
     cy: float | None = None
     position: tuple[float, float, float]
     quaternion: tuple[float, float, float, float]
+    distortion: list[float] = []
 
     def middle(self) -> tuple[float, float]:
         """The principal point, in the middle of the picture where the file does not say."""
@@ -211,7 +230,11 @@ def _towards(ahead: FloatArray) -> FloatArray:
     up = np.array([0.0, 0.0, 1.0]) if abs(z[2]) < 0.999 else np.array([0.0, 1.0, 0.0])
     x = np.cross(z, up)
     x /= np.linalg.norm(x)
-    m = np.stack([x, np.cross(z, x), z], axis=1)
+    return quaternion_of(np.stack([x, np.cross(z, x), z], axis=1))
+
+
+def quaternion_of(m: FloatArray) -> FloatArray:
+    """The unit quaternion w x y z of a rotation matrix ``(3, 3)``, with w not below zero."""
     # Bar-Itzhack (2000): the quaternion is the eigenvector of the largest eigenvalue of this symmetric matrix
     k = np.array(
         [

@@ -1,5 +1,6 @@
 """Frames: what a camera gave of one take, and the take itself."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,6 +48,27 @@ class Frames:
         """Frames as they are, or a bare array ``(T, H, W, 3)`` of them."""
         return source if isinstance(source, Frames) else cls(np.asarray(source))
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Frames]") -> "Frames":
+        """Frames of several takes one after the other; a layer, or the camera, where all have it.
+
+        Raises:
+            InputError: they differ in size.
+        """
+        sizes = sorted({p.rgb.shape[2:0:-1] for p in parts})
+        if len(sizes) > 1:
+            told = " and ".join(f"{w} x {h}" for w, h in sizes)
+            raise InputError(f"frames of {told} pixels cannot be joined; import them with the same --size")
+        depth = [p.depth for p in parts if p.depth is not None]
+        robot = [p.robot for p in parts if p.robot is not None]
+        tables = [None if p.camera is None else p.camera.as_table() for p in parts]
+        return cls(
+            np.concatenate([p.rgb for p in parts]),
+            np.concatenate(depth) if len(depth) == len(parts) else None,
+            np.concatenate(robot) if len(robot) == len(parts) else None,
+            parts[0].camera if all(t == tables[0] for t in tables) else None,
+        )
+
     def __len__(self) -> int:
         return len(self.rgb)
 
@@ -82,5 +104,7 @@ class Video:
             raise InputError(f"video {self.name!r}: time has shape {self.time.shape} for {len(self.frames)} frames")
         if len(self.time) < 2 or not np.isfinite(self.time).all() or not (np.diff(self.time) > 0).all():
             raise InputError(f"video {self.name!r} needs at least 2 frames at finite times that rise")
+        if not 0 <= self.load < float("inf"):
+            raise InputError(f"video {self.name!r}: load must be finite and not negative, but is {self.load:g} kg")
         if not self.motion:
             object.__setattr__(self, "motion", self.name)

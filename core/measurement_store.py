@@ -60,6 +60,10 @@ def read_gripper(group: zarr.Group) -> Motion | None:
 def load_measurement(path: Path) -> Measurement:
     """Read a store; the hidden label of a generated measurement is not read."""
     root = open_store(path)
+    if root.attrs.get("kind") == "video":
+        raise InputError(
+            f"{path} is a video; extract points first: muslin extract {path} --extractor NAME -o POINTS.zarr"
+        )
     if root.attrs.get("kind") != "measurement":
         raise InputError(f"{path} is not a measurement but {root.attrs.get('kind')!r}; make one with: muslin import")
     names = cast(list[str], root.attrs.get("recordings", []))

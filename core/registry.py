@@ -153,6 +153,9 @@ _EXTRAS = {
     "meshio": "mesh",
     "cv2": "perception",
     "safetensors": "perception",
+    "av": "perception",
+    "pyarrow": "robotics",
+    "rosbags": "robotics",
 }
 
 

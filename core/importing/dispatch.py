@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..camera import Camera
 from ..errors import InputError, MissingFileError
+from ..lens import Lens
 from ..measurement import Recording
 from ..motion import Motion
 from ..series import PointSeries
@@ -65,6 +65,9 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
     take = _cropped(take, options, where)
     points, si = to_si(take.points, unit, where)
     points = turned(points, options.up, where)
+    lens = None if options.camera is None else Lens.load(options.camera)
+    if lens is not None and si == "px" and points.shape[2] == 2:
+        points = lens.undistorted_points(points)
     told = [c for c in (options.correspondence, take.correspondence) if c is not None]
     if gripper is not None and (gripper.times[-1] < take.time[0] or gripper.times[0] > take.time[-1]):
         raise InputError(
@@ -76,8 +79,9 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
         if not series.valid.any():  # a file that lacks a coordinate throughout has its columns mixed up
             raise InputError("every point is NaN in every frame; check the columns and the marker labels")
         load = options.load if options.load is not None else (take.load or 0.0)
-        camera = None if options.camera is None else Camera.load(options.camera)
-        return Recording(name, series, gripper, options.motion or take.motion or "", load, camera)
+        return Recording(
+            name, series, gripper, options.motion or take.motion or "", load, lens.camera if lens else None
+        )
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
 

@@ -19,7 +19,7 @@ class ImportOptions:
         correspondence: whether point p is the same spot in every frame; None takes the file's own
             word, or true.
         gripper: CSV file of gripper poses.
-        camera: file of the camera that pixels are of.
+        camera: camera file of the pictures that points in pixels are of, or of the frames of a video.
     """
 
     unit: str | None = None

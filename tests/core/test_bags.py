@@ -1,0 +1,109 @@
+"""MCAP files and ROS bags: topics, clocks, encodings."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from filmed import pictures, place
+from recorded_sets import NOW, compressed, image, pose, transforms, write_bag
+
+from muslin.core.errors import InputError
+from muslin.core.frames import Video
+from muslin.core.importing.video import VideoOptions, import_video
+
+TIME = np.arange(12) / 30.0 + 0.3
+FRAMES = pictures(TIME)
+DELAY = 0.05
+
+
+def images(make=image, delay: float = DELAY, clock: float = NOW):  # type: ignore[no-untyped-def]
+    return lambda: [(NOW + t + delay, make(p, clock + t)) for t, p in zip(TIME, FRAMES, strict=True)]
+
+
+def poses(make=pose, delay: float = 0.002):  # type: ignore[no-untyped-def]
+    fine = np.arange(20, 90) / 100.0
+    return lambda: [(NOW + t + delay, make(NOW + t, x)) for t, x in zip(fine, place(fine), strict=True)]
+
+
+def one(path: Path, **options: object) -> tuple[Video, str]:
+    ((video, notes),) = import_video(path, VideoOptions(**options))  # type: ignore[arg-type]
+    return video, "\n".join(notes)
+
+
+@pytest.mark.parametrize(("name", "storage"), [("take.mcap", "mcap"), ("bag", "mcap"), ("bag", "sqlite3")])
+def test_a_bag_gives_frames_and_poses_on_the_clock_of_their_headers(name: str, storage: str, tmp_path: Path) -> None:
+    video, said = one(write_bag(tmp_path / name, {"/camera": images(), "/gripper": poses()}, storage))
+    np.testing.assert_array_equal(video.frames.rgb, FRAMES)
+    np.testing.assert_allclose(video.time, TIME - TIME[0], atol=1e-6)
+    assert video.gripper is not None
+    np.testing.assert_allclose(video.gripper.at(video.time)[:, 0, 0], place(TIME), atol=1e-3)
+    np.testing.assert_allclose(video.gripper.poses[0, 0], (0.0, 0.1, 0.3, 0.8, 0.0, 0.0, 0.6), atol=1e-6)
+    assert "0.050 s before they were written" in said and "in frame 'base'" in said
+
+
+def test_the_time_of_writing_may_be_taken(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "take.mcap", {"/camera": images(), "/gripper": poses()})
+    video, _ = one(path, clock="log")
+    assert video.gripper is not None  # poses are written 48 ms sooner after their measurement than pictures
+    assert abs(video.gripper.times[0] - (0.2 + 0.002 - 0.3 - DELAY)) < 1e-5
+
+
+def test_two_clocks_are_noticed_and_no_stamps_are_replaced(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "own.mcap", {"/camera": images(clock=NOW - 7.0), "/gripper": poses()})
+    with pytest.raises(InputError, match=r"different clocks: --offset 6\.9"):
+        one(path)
+    _, said = one(path, offset=7.0)
+    assert "two clocks; --clock log" in said
+    unstamped = images(make=lambda picture, time: image(picture, 0.0))
+    video, said = one(write_bag(tmp_path / "none.mcap", {"/camera": unstamped, "/gripper": poses()}))
+    np.testing.assert_allclose(video.time, TIME - TIME[0], atol=1e-6)
+    assert "no time in their header" in said
+
+
+def test_compressed_pictures_and_transforms(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "take.mcap", {"/camera/png": images(compressed), "/tf": poses(transforms)})
+    with pytest.raises(InputError, match="poses of elbow, gripper; say --pose /tf:FRAME"):
+        one(path)
+    video, _ = one(path, pose="/tf:gripper")
+    np.testing.assert_array_equal(video.frames.rgb, FRAMES)
+    assert video.gripper is not None
+    np.testing.assert_allclose(video.gripper.at(video.time)[:, 0, 0], place(TIME), atol=1e-3)
+    assert one(path, pose="none")[0].gripper is None
+
+
+@pytest.mark.parametrize("encoding", ["bgr8", "mono8", "rgba8"])
+def test_encodings(encoding: str, tmp_path: Path) -> None:
+    def made(picture: np.ndarray, time: float) -> object:
+        full = np.full((*picture.shape[:2], 1), 255, np.uint8)
+        data = {"bgr8": picture[..., ::-1], "mono8": picture[..., :1], "rgba8": np.concatenate([picture, full], axis=2)}
+        return image(np.ascontiguousarray(data[encoding]), time, encoding)
+
+    rgb = one(write_bag(tmp_path / "take.mcap", {"/camera": images(made)}))[0].frames.rgb
+    wanted = np.stack(FRAMES)
+    np.testing.assert_array_equal(rgb, np.repeat(wanted[..., :1], 3, axis=3) if encoding == "mono8" else wanted)
+
+
+def test_what_is_not_there_is_told_with_what_is(tmp_path: Path) -> None:
+    two = write_bag(tmp_path / "two.mcap", {"/left": images(), "/right": images(compressed), "/gripper": poses()})
+    for options, told in (
+        ({}, "2 image topics; choose with --image one of /left, /right"),
+        ({"image": "/top"}, r"no image topic '/top'.*/gripper \(geometry_msgs/msg/PoseStamped\)"),
+        ({"image": "/left", "pose": "/arm"}, "no pose topic '/arm'; choose with --pose one of /gripper"),
+    ):
+        with pytest.raises(InputError, match=told):
+            one(two, **options)
+    with pytest.raises(InputError, match="no topic with images; it has /gripper"):
+        one(write_bag(tmp_path / "blind.mcap", {"/gripper": poses()}))
+    deep = images(lambda picture, time: image(picture, time, "16UC1"))
+    with pytest.raises(InputError, match="encoding '16UC1'; pictures may have rgb8"):
+        one(write_bag(tmp_path / "deep.mcap", {"/depth": deep}))
+
+
+def test_a_bag_that_is_cut_off(tmp_path: Path) -> None:
+    path = write_bag(tmp_path / "take.mcap", {"/camera": images()})
+    path.write_bytes(path.read_bytes()[:3000])
+    with pytest.raises(InputError, match="cannot be read as a bag"):
+        one(path)
+    (tmp_path / "junk.mcap").write_bytes(b"junk")
+    with pytest.raises(InputError, match="cannot be read as a bag"):
+        one(tmp_path / "junk.mcap")
