@@ -24,6 +24,9 @@ ENGINES = (
     "xarray",
     "ezc3d",
     "meshio",
+    "av",
+    "pyarrow",
+    "rosbags",
 )
 LONGEST = 300
 
