@@ -87,3 +87,18 @@ def test_without_motion_no_offset_is_made_up(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"does not tell the offset \(.*give --offset SECONDS"):
         imported(still, poses, None)
     assert "--offset auto" not in imported(still, poses, 0.0)[1]
+
+
+def test_an_object_that_swings_on_does_not_tell_a_wrong_offset() -> None:
+    moved = place(TIME)
+    swing = np.zeros(len(TIME))  # a weight on a spring, pulled by the gripper, slow and hardly damped
+    speed = 0.0
+    for k in range(1, len(TIME)):
+        speed += (60.0 * (moved[k] - swing[k - 1]) - 1.0 * speed) / RATE
+        swing[k] = swing[k - 1] + speed / RATE
+    frames = np.full((len(TIME), 48, 64, 3), 60, np.uint8)
+    for k, x in enumerate(swing):
+        left = max(0, round(12 + 250 * x))
+        frames[k, 16:30, left : left + 12] = 220
+    found = estimated_offset(TIME, Frames(frames), motion(FINE, 0.4))
+    assert not found.clear or abs(found.offset - 0.4) < 2.0 / RATE, found
