@@ -25,6 +25,9 @@ ENGINES = (
     "xarray",
     "ezc3d",
     "meshio",
+    "av",
+    "pyarrow",
+    "rosbags",
 )
 LONGEST = 300
 

@@ -71,9 +71,34 @@ def test_a_wrong_offset_is_doubted_and_the_found_one_taken(seen: Path, tmp_path:
     assert "--offset auto" not in said
 
 
+def test_poses_on_the_clock_of_the_day_are_brought_to_the_first_frame(seen: Path, tmp_path: Path) -> None:
+    poses = write_poses(tmp_path / "poses.csv", FINE, 1.7e9)
+    with pytest.raises(InputError, match=r"different clocks: --offset 1699999999\.500 has both begin together"):
+        imported(seen, poses, 0.0)
+    ((video, notes),) = import_video(seen, VideoOptions(gripper=poses, offset=None))
+    assert video.time[0] == 0.0 and video.gripper is not None
+    assert abs(video.gripper.times[0] + 0.5) < 0.012
+    assert any(n.startswith("time 0 is 17000000") or n.startswith("time 0 is 1699999999.99") for n in notes)
+
+
 def test_without_motion_no_offset_is_made_up(tmp_path: Path) -> None:
     still = write_folder(tmp_path / "still", pictures(np.zeros(40)), TIME[:40])
     poses = write_poses(tmp_path / "poses.csv", FINE)
     with pytest.raises(InputError, match=r"does not tell the offset \(.*give --offset SECONDS"):
         imported(still, poses, None)
     assert "--offset auto" not in imported(still, poses, 0.0)[1]
+
+
+def test_an_object_that_swings_on_does_not_tell_a_wrong_offset() -> None:
+    moved = place(TIME)
+    swing = np.zeros(len(TIME))  # a weight on a spring, pulled by the gripper, slow and hardly damped
+    speed = 0.0
+    for k in range(1, len(TIME)):
+        speed += (60.0 * (moved[k] - swing[k - 1]) - 1.0 * speed) / RATE
+        swing[k] = swing[k - 1] + speed / RATE
+    frames = np.full((len(TIME), 48, 64, 3), 60, np.uint8)
+    for k, x in enumerate(swing):
+        left = max(0, round(12 + 250 * x))
+        frames[k, 16:30, left : left + 12] = 220
+    found = estimated_offset(TIME, Frames(frames), motion(FINE, 0.4))
+    assert not found.clear or abs(found.offset - 0.4) < 2.0 / RATE, found

@@ -211,7 +211,7 @@ def test_folders_that_cannot_be_right(spoil: object, told: str, folder: Path) ->
         ({"robot": "nix"}, "no folder"),
         ({"start": 2.0}, "0 frame.*go from 0 to 0.366667 s"),
         ({"start": 2.0, "stop": 1.0}, "start must be before stop"),
-        ({"gripper": "late.csv"}, "poses go from 50 to .* --offset 50 has both begin together"),
+        ({"gripper": "late.csv"}, "poses go from 50.000 to .* --offset 50.000 has both begin together"),
         ({"offset": 1.0}, "there are none; give --poses"),
         ({"fps": 0.0}, "--fps"),
         ({"size": (0, 4)}, "--size"),

@@ -9,6 +9,7 @@ from ...errors import InputError
 from ...frames import Video
 from ...motion import Motion
 from .energy import estimated_offset
+from .times import EPOCH
 
 
 def aligned(video: Video, offset: float | None, where: str) -> tuple[Video, tuple[str, ...]]:
@@ -43,8 +44,8 @@ def aligned(video: Video, offset: float | None, where: str) -> tuple[Video, tupl
     if covered.sum() < 2:
         apart = gripper.times[0] - video.time[0]
         raise InputError(
-            f"{where}: the gripper poses go from {gripper.times[0]:.6g} to {gripper.times[-1]:.6g} s, but the frames "
-            f"from {video.time[0]:.6g} to {video.time[-1]:.6g} s; they have different clocks: --offset {apart:.6g} "
+            f"{where}: the gripper poses go from {gripper.times[0]:.3f} to {gripper.times[-1]:.3f} s, but the frames "
+            f"from {video.time[0]:.3f} to {video.time[-1]:.3f} s; they have different clocks: --offset {apart:.3f} "
             "has both begin together, --offset auto looks for it in the motion"
         )
     notes.append(_beginning(float(video.time[0] - gripper.times[0])))
@@ -55,6 +56,10 @@ def aligned(video: Video, offset: float | None, where: str) -> tuple[Video, tupl
             "pose covers"
         )
         video = replace(video, time=video.time[covered], frames=video.frames[covered])
+    if (origin := float(video.time[0])) > EPOCH:
+        # a time since 1970 has no digits left for what is between two frames where it is printed or stored short
+        video = replace(video, time=video.time - origin, gripper=Motion(gripper.times - origin, gripper.poses))
+        notes.append(f"time 0 is {origin:.3f} s of the poses")
     return video, tuple(notes)
 
 

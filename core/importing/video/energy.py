@@ -9,8 +9,9 @@ from ...arrays import FloatArray
 from ...frames import Frames
 from ...motion import Motion
 
-#: Below this correlation the motion in the picture is not that of the gripper.
-FAINT = 0.6
+#: Below this correlation the motion in the picture is not that of the gripper: an object that swings on, or is wound
+#: up late, agrees by less at a wrong offset. The robot's mask, if there is one, shows the gripper alone.
+FAINT = 0.8
 #: Nor is it below so many standard errors of Fisher's z: short signals agree by chance.
 ERRORS = 4.0
 #: Motion must raise the change from frame to frame by this share; the noise of a camera alone does by 0.04.
