@@ -49,7 +49,7 @@ def extract(
     """Find points in every frame of a video: a measurement, with camera, gripper, motion and load of the video."""
     if output.exists() and not force:
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
-    finder = _extractor(extractor, option or [], weights)
+    finder, options = _extractor(extractor, option or [], weights)
     videos = load_videos(video)
     made: list[Recording] = []
     began = time.perf_counter()
@@ -63,7 +63,7 @@ def extract(
             except InputError as error:
                 raise InputError(f"{video}, {take.name!r}: {error}") from error
     seconds = time.perf_counter() - began
-    save_measurement(Measurement(tuple(made)), output, overwrite=force)
+    save_measurement(Measurement(tuple(made)), output, found_by={"name": extractor, **options}, overwrite=force)
     count = sum(len(take.frames) for take in videos)
     say(f"wrote {output}: {count} frames by {extractor!r} at {count / seconds:.1f} a second")
     for recording in made:
@@ -91,7 +91,7 @@ def train(
 ) -> None:
     """Train an extractor on the frames of a video: on all of them, or on those that are annotated."""
     check_output(output, force)
-    finder = _extractor(extractor, option or [], None)
+    finder, _ = _extractor(extractor, option or [], None)
     save = getattr(finder, "save", None)
     if save is None:
         raise InputError(f"extractor {extractor!r} learns nothing; use it at once: muslin extract")
@@ -116,8 +116,8 @@ def _all(videos: Sequence[Video]) -> Frames:
     return Frames.joined([v.frames for v in videos])
 
 
-def _extractor(name: str, given: Sequence[str], weights: Path | None) -> KeypointExtractor:
-    """The extractor of that name with its options; it must look at pictures."""
+def _extractor(name: str, given: Sequence[str], weights: Path | None) -> tuple[KeypointExtractor, dict[str, Any]]:
+    """The extractor of that name, and its options; it must look at pictures."""
     make = REGISTRY.get("extractor", name)
     if not make.needs_images:
         seeing = ", ".join(n for n in REGISTRY.names("extractor") if REGISTRY.get("extractor", n).needs_images)
@@ -138,14 +138,14 @@ def _extractor(name: str, given: Sequence[str], weights: Path | None) -> Keypoin
             raise InputError(f"extractor {name!r} learns nothing, so it has no weights; leave --weights out")
         if not weights.is_file():
             raise MissingFileError(f"there is no file {weights}; muslin train {name} writes one")
-        options["weights"] = str(weights)
+        options["weights"] = str(weights.absolute())
     try:
         finder: KeypointExtractor = make(**options)
     except TypeError as error:
         raise InputError(
             f"extractor {name!r} cannot be made with {', '.join(given) or 'no options'}: {error}"
         ) from error
-    return finder
+    return finder, options
 
 
 def _value(text: str) -> Any:

@@ -3,6 +3,7 @@
 import os
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -11,7 +12,7 @@ import typer
 from ..core.errors import InputError
 from ..core.importing.video import is_video
 from ..core.measurement import Measurement
-from ..core.measurement_store import load_measurement
+from ..core.measurement_store import load_measurement, read_found_by
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
 from ..core.store import write_text
@@ -128,8 +129,15 @@ def new(
         grasp_points=table.get("grasp_points"),
         points=_numbers(points, int, "--points") or None,
         markers=parse_markers(markers),
+        extractor=_found_by(measurement, study),
     )
-    plan, remarks = place_markers(plan, measured, study, body)
+    remarks: list[str] = []
+    if plan.extractor is None:
+        plan, remarks = place_markers(plan, measured, study, body)
+    elif markers.strip():
+        raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
+    else:
+        plan = replace(plan, markers="all")
     text = study_text(plan)
     problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
     remarks += doubtful_starts(problem)
@@ -145,6 +153,14 @@ def new(
 def _from(study: Path, file: Path) -> str:
     """A path as it is written in the study file, relative to it."""
     return Path(os.path.relpath(file.absolute(), study.absolute().parent)).as_posix()
+
+
+def _found_by(measurement: Path, study: Path) -> dict[str, Any] | None:
+    """The extractor of the points, with the path of what it has learned as it is written in the study file."""
+    found = read_found_by(measurement)
+    if found and "weights" in found:
+        found["weights"] = _from(study, Path(found["weights"]))
+    return found
 
 
 def _points(text: str) -> list[list[float]]:

@@ -32,6 +32,7 @@ class Plan:
         grasp_points: where each gripper holds it, None for where the scenario says.
         points: measured points to compare, None for all.
         markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
+        extractor: name and options of what found the points in pictures, or None where they were measured.
     """
 
     measurement: str
@@ -49,6 +50,7 @@ class Plan:
     grasp_points: list[list[float]] | None
     points: list[int] | None
     markers: str | list[int] | None
+    extractor: dict[str, Any] | None = None
 
 
 def plan_table(plan: Plan) -> dict[str, Any]:
@@ -178,8 +180,7 @@ def _plugins(plan: Plan) -> str:
 [simulator]
 name = {_value(plan.simulator)}  # installed: {", ".join(REGISTRY.names("simulator"))}
 {options}
-[extractor]
-name = "markers"
+{_extractor(plan)}
 
 [estimator]
 name = {_value(plan.estimator)}  # installed: {", ".join(REGISTRY.names("estimator"))}
@@ -188,6 +189,16 @@ draws = {default.draws}  # simulations a round and recording
 stop = {default.stop}  # rounds end once the posterior moves by less, in its own standard deviations; 0: never
 proposal = {_value(default.proposals)}  # or "posterior"; "gaussian" is BayesSim's own
 """
+
+
+def _extractor(plan: Plan) -> str:
+    if plan.extractor is None:
+        return '[extractor]\nname = "markers"\n'
+    told = [f"{key} = {_value(value)}" for key, value in plan.extractor.items() if key != "name"]
+    name = (
+        f"name = {_value(plan.extractor['name'])}  # found the points, and looks at drawn pictures of what is simulated"
+    )
+    return "\n".join(["[extractor]", name, *told, ""])
 
 
 def _options(kind: str, name: str) -> list[str]:

@@ -73,7 +73,7 @@ def annotated_frames(annotations: Annotations, video: VideoFrames) -> tuple[Fram
     order = sorted(kept, key=lambda n: (recordings.index(found[n][0]), found[n][1]))
     parts = [video.some(r, [found[n][1] for n in order if found[n][0] == r]) for r in recordings]
     points = np.where((annotations.flags == SEEN)[..., None], annotations.points, np.nan)
-    return _joined(parts), points[order]
+    return Frames.joined(parts), points[order]
 
 
 def _of_name(name: str, video: VideoFrames) -> tuple[str, int]:
@@ -105,19 +105,3 @@ def _of_folder(annotations: Annotations, video: VideoFrames) -> list[tuple[str, 
 
 def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", name)]
-
-
-def _joined(parts: list[Frames]) -> Frames:
-    """One after the other; a layer, or the camera, where all have it."""
-    if len(parts) == 1:
-        return parts[0]
-    depth = [p.depth for p in parts if p.depth is not None]
-    robot = [p.robot for p in parts if p.robot is not None]
-    camera = parts[0].camera
-    same = camera is not None and all(p.camera is not None and p.camera.as_table() == camera.as_table() for p in parts)
-    return Frames(
-        np.concatenate([p.rgb for p in parts]),
-        np.concatenate(depth) if len(depth) == len(parts) else None,
-        np.concatenate(robot) if len(robot) == len(parts) else None,
-        camera if same else None,
-    )

@@ -17,7 +17,12 @@ _AXES = ("x", "y", "z")
 
 
 def save_measurement(
-    measurement: Measurement, path: Path, *, hidden: Mapping[str, Any] | None = None, overwrite: bool = False
+    measurement: Measurement,
+    path: Path,
+    *,
+    hidden: Mapping[str, Any] | None = None,
+    found_by: Mapping[str, Any] | None = None,
+    overwrite: bool = False,
 ) -> None:
     """Write a store.
 
@@ -25,10 +30,13 @@ def save_measurement(
         measurement: to write.
         path: of the new store.
         hidden: what a generated measurement hides, for the reader of a report; see :func:`read_hidden`.
+        found_by: the extractor that found the points in pictures, its name and options; see :func:`read_found_by`.
         overwrite: replace a store that is there.
     """
     with new_store(path, overwrite=overwrite) as root:
         root.attrs.update({"kind": "measurement", "recordings": measurement.names})
+        if found_by is not None:
+            root.attrs["found_by"] = dict(found_by)
         if hidden is not None:
             root.attrs["hidden"] = dict(hidden)
         for r in measurement.recordings:
@@ -68,6 +76,12 @@ def load_measurement(path: Path) -> Measurement:
         raise InputError(f"{path} is not a measurement but {root.attrs.get('kind')!r}; make one with: muslin import")
     names = cast(list[str], root.attrs.get("recordings", []))
     return Measurement(tuple(_recording(root, name, path) for name in names))
+
+
+def read_found_by(path: Path) -> dict[str, Any] | None:
+    """``name`` and options of the extractor that found the points in pictures, or None where they were measured."""
+    found_by = open_store(path).attrs.get("found_by")
+    return dict(cast(Mapping[str, Any], found_by)) if found_by is not None else None
 
 
 def read_hidden(path: Path) -> dict[str, Any] | None:

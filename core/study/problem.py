@@ -125,7 +125,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     used = {n: measurement[n] for n in (*fit_on, *hold_out)}
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
-    extractor = _plugin("extractor", config.extractor.name, config.extractor.options)
+    options = dict(config.extractor.options)
+    if isinstance(options.get("weights"), str):
+        options["weights"] = str(folder / options["weights"])
+    extractor = _plugin("extractor", config.extractor.name, options)
     scenarios = {n: build_scenario(config.scenario, r, folder, extractor.uses_markers) for n, r in recordings.items()}
     kind = scenarios[fit_on[0]].body.kind
     material = with_fields(base.default_material(kind), dict(config.material))
