@@ -1,6 +1,7 @@
 """Keypoint extractors: frames to point series."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -21,6 +22,10 @@ class KeypointExtractor(ABC):
     name: ClassVar[str]
     #: True if it needs images; then :meth:`extract` gets frames, else it gets points.
     needs_images: ClassVar[bool]
+    #: True if a point that is not in a picture comes out as NaN.
+    reports_unseen: ClassVar[bool] = False
+    #: Options with which one that learns does so in seconds, however badly; the conformance kit takes them.
+    quick: ClassVar[Mapping[str, object]] = {}
 
     def fit(self, frames: Frames | npt.NDArray[np.uint8], keypoints: FloatArray | None = None) -> None:
         """Learn from ``frames (N, H, W, 3)``, and ``keypoints (N, K, 2)`` [px] where they are annotated."""

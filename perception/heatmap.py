@@ -1,6 +1,6 @@
 """Keypoints from annotated frames: one heatmap a keypoint."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
@@ -59,6 +59,8 @@ class HeatmapExtractor(KeypointExtractor):
 
     name: ClassVar[str] = "heatmap"
     needs_images: ClassVar[bool] = True
+    reports_unseen: ClassVar[bool] = True
+    quick: ClassVar[Mapping[str, object]] = {"epochs": 12, "size": 64}
 
     def __init__(
         self,
