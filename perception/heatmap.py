@@ -60,7 +60,7 @@ class HeatmapExtractor(KeypointExtractor):
     name: ClassVar[str] = "heatmap"
     needs_images: ClassVar[bool] = True
     reports_unseen: ClassVar[bool] = True
-    quick: ClassVar[Mapping[str, object]] = {"epochs": 12, "size": 64}
+    quick: ClassVar[Mapping[str, object]] = {"epochs": 8, "size": 32}
 
     def __init__(
         self,

@@ -194,7 +194,7 @@ class _Held:
 
     def __init__(self, images: Tensor, points: Tensor, seed: int) -> None:
         torch.manual_seed(seed + 1)
-        changed = [_augmented(_augmentation(), images, points) for _ in range(max(1, 32 // len(images)))]
+        changed = [_augmented(_augmentation(), images, points) for _ in range(max(1, 12 // len(images)))]
         parts = [(images, points), *changed]
         self.images, self.points = _with_blanks(torch.cat([p[0] for p in parts]), torch.cat([p[1] for p in parts]))
         self.plain = len(images)
