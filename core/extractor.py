@@ -1,12 +1,14 @@
 """Keypoint extractors: frames to point series."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from .arrays import FloatArray
+from .errors import InputError, RolloutFailed
 from .frames import Frames
 from .series import PointSeries
 from .simulated_take import SimulatedTake
@@ -21,6 +23,10 @@ class KeypointExtractor(ABC):
     name: ClassVar[str]
     #: True if it needs images; then :meth:`extract` gets frames, else it gets points.
     needs_images: ClassVar[bool]
+    #: True if a point that is not in a picture comes out as NaN.
+    reports_unseen: ClassVar[bool] = False
+    #: Options with which one that learns does so in seconds, however badly; the conformance kit takes them.
+    quick: ClassVar[Mapping[str, object]] = {}
 
     def fit(self, frames: Frames | npt.NDArray[np.uint8], keypoints: FloatArray | None = None) -> None:
         """Learn from ``frames (N, H, W, 3)``, and ``keypoints (N, K, 2)`` [px] where they are annotated."""
@@ -34,9 +40,16 @@ class KeypointExtractor(ABC):
         """Points of a simulated take, as they would have been found in a recording of it.
 
         By default those of its rendered frames, or of its markers, projected where the recording is in pixels.
+
+        Raises:
+            RolloutFailed: nothing is found in any frame of it.
         """
         if self.needs_images:
-            return self.extract(take.frames(), take.series.time)
+            frames = take.frames()
+            try:
+                return self.extract(frames, take.series.time)
+            except InputError as error:
+                raise RolloutFailed(f"nothing is found in its pictures: {error}") from error
         seen = take.series if take.camera is None or take.unit == "m" else take.projected()
         return self.extract(seen, seen.time)
 

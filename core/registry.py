@@ -153,6 +153,8 @@ _EXTRAS = {
     "meshio": "mesh",
     "cv2": "perception",
     "safetensors": "perception",
+    "monai": "heatmap",
+    "kornia": "heatmap",
     "av": "perception",
     "pyarrow": "robotics",
     "rosbags": "robotics",

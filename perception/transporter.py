@@ -1,6 +1,6 @@
 """Keypoints without annotation: what must be carried from one picture to another to make it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
@@ -47,6 +47,7 @@ class TransporterExtractor(KeypointExtractor):
 
     name: ClassVar[str] = "transporter"
     needs_images: ClassVar[bool] = True
+    quick: ClassVar[Mapping[str, object]] = {"steps": 10, "size": 32}
 
     def __init__(
         self,

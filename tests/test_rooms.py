@@ -19,6 +19,8 @@ ENGINES = (
     "scipy",
     "cv2",
     "safetensors",
+    "monai",
+    "kornia",
     "trimesh",
     "matplotlib",
     "jinja2",

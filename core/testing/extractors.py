@@ -9,8 +9,9 @@ from ..errors import MuslinError
 from ..extractor import KeypointExtractor
 from ..series import PointSeries
 from .checks import Check, check_leaves_random_state, check_pickles, must, must_raise, raise_failures
+from .image_extractors import image_checks
 
-MakeExtractor = Callable[[], KeypointExtractor]
+MakeExtractor = Callable[..., KeypointExtractor]
 
 _TIME = np.linspace(0.0, 0.4, 5)
 
@@ -19,7 +20,8 @@ def check_extractor(make: MakeExtractor) -> None:
     """Hold an extractor against everything that muslin relies on.
 
     Args:
-        make: builds the extractor; its class, if all options have defaults.
+        make: builds the extractor; its class, if all options have defaults. One that learns is also made with its
+            ``quick`` options, and anew with the option ``weights``.
 
     Raises:
         AssertionError: lists every broken promise.
@@ -29,9 +31,13 @@ def check_extractor(make: MakeExtractor) -> None:
 
 def extractor_checks(make: MakeExtractor) -> list[Check]:
     """The checks of :func:`check_extractor`, one a promise."""
-    checks = {"declares itself": check_declares, "survives pickle": check_pickled}
+    checks: dict[str, Callable[[MakeExtractor], None]] = {
+        "declares itself": check_declares,
+        "survives pickle": check_pickled,
+    }
     if make().needs_images:
         checks["finds points in images, or says that it must learn first"] = check_images
+        checks |= image_checks(make)
     else:
         checks |= {
             "takes points": check_points,
