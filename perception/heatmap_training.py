@@ -113,7 +113,7 @@ def train(
             batch = _with_blanks(*_augmented(augment, images[chosen], points[chosen]))
             loss = _loss(net, *(part.to(device) for part in batch))
             optimiser.zero_grad()
-            loss.backward()
+            torch.autograd.backward(loss)
             torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             optimiser.step()
             schedule.step()
@@ -162,7 +162,7 @@ def _augmentation() -> Callable[..., tuple[Tensor, Tensor]]:
     import kornia.augmentation as changes
     from kornia.constants import SamplePadding
 
-    return changes.AugmentationSequential(  # type: ignore[no-any-return]
+    return changes.AugmentationSequential(
         changes.RandomAffine(
             degrees=10.0, translate=(0.1, 0.1), scale=(0.85, 1.15), padding_mode=SamplePadding.BORDER, p=0.9
         ),

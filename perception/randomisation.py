@@ -72,4 +72,4 @@ def _print(rng: np.random.Generator, colour: IntArray) -> Image:
         across = np.sin(2 * np.pi * (rng.uniform(1.5, 5) * u + rng.random()))
         down = np.sin(2 * np.pi * (rng.uniform(1.5, 5) * v + rng.random()))
         share = (across > 0).astype(float) if kind == 0 else (across * down > 0).astype(float)
-    return (colour + share[..., None] * (other - colour)).astype(np.uint8)
+    return np.asarray(colour + share[..., None] * (other - colour), np.uint8)

@@ -161,7 +161,7 @@ def check_saved(make: MakeExtractor, found: Found) -> None:
             json.loads(data[8 : 8 + length])
         except ValueError as error:
             raise AssertionError("the file is no safetensors file: its header is not JSON") from error
-        again = cast(KeypointExtractor, make(weights=str(path)))
+        again = make(weights=str(path))
         _same(again.extract(frames, _times(frames)).points, found[1].points, "made from its file it finds other points")
         path.write_bytes(data[: len(data) // 2])
         must_raise(MuslinError, lambda: make(weights=str(path)), "half of its file is taken without a complaint")
@@ -196,7 +196,7 @@ def check_blank(make: MakeExtractor, found: Found) -> None:
 
 
 def _times(frames: Frames) -> FloatArray:
-    return 0.1 * np.arange(len(frames))
+    return np.asarray(0.1 * np.arange(len(frames)), float)
 
 
 def _same(got: FloatArray, wanted: FloatArray, complaint: str, within: float = _SAME) -> None:

@@ -96,7 +96,7 @@ def test_too_few_frames_and_wrong_options_are_told() -> None:
 
 
 def test_it_looks_only_after_it_has_learned_and_at_frames() -> None:
-    with pytest.raises(InputError, match="has not learned yet.*muslin train heatmap"):
+    with pytest.raises(InputError, match=r"has not learned yet.*muslin train heatmap"):
         HeatmapExtractor().extract(FRAMES, TIME)
     with pytest.raises(InputError, match="takes images, not points"):
         HeatmapExtractor().extract(PointSeries(TIME, POINTS), TIME)
@@ -110,7 +110,7 @@ def test_files_that_are_not_its_weights_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read as weights"):
         HeatmapExtractor(weights=path)
     save_weights(path, "transporter", {"a": np.zeros(1)}, {})
-    with pytest.raises(InputError, match="'?transporter'?, not of extractor 'heatmap'"):
+    with pytest.raises(InputError, match="not of extractor 'heatmap'"):
         HeatmapExtractor(weights=path)
     about = {"keypoints": 4, "stages": 3, "height": 64, "width": 64, "threshold": 0.5}
     save_weights(path, "heatmap", {"draw.bias": np.zeros(3)}, about)
@@ -148,7 +148,7 @@ def test_its_file_says_what_it_is_and_carries_options_of_its_user(learned: Heatm
     again = HeatmapExtractor(weights=tmp_path / "squares.safetensors", peak="argmax", threshold=0.0)
     assert again.keypoints == 2
     assert np.isfinite(again.extract(FRAMES, TIME).points).all()
-    with pytest.raises(InputError, match="no keypoint reaches a confidence of 1.00"):
+    with pytest.raises(InputError, match=r"no keypoint reaches a confidence of 1\.00"):
         HeatmapExtractor(weights=tmp_path / "squares.safetensors", threshold=1.0).extract(FRAMES, TIME)
 
 
