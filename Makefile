@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
 .PHONY: demo test lint bench bench-calibration bench-effects bench-hidden-small bench-inference bench-material bench-paper \
-	bench-proposals bench-real bench-sets bench-sim clean
+	bench-perception bench-proposals bench-real bench-sets bench-sim clean
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -58,6 +58,10 @@ bench-inference: $(VENV)/.ready-bench
 
 bench-paper: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/paper.py $(PAPER)
+
+# some 20 minutes; PERCEPTION="--scenarios wiping --shifts --frames 60 --epochs 5" for a small one
+bench-perception: $(VENV)/.ready
+	$(BIN)/python tests/benchmarks/perception.py $(PERCEPTION)
 
 bench-calibration: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/calibration.py

@@ -158,12 +158,12 @@ class HeatmapExtractor(KeypointExtractor):
             raise InputError("extractor 'heatmap' takes images, not points; give it a video")
         frames = Frames.of(source)
         points, sure = self.locate(frames)
-        if sure.size and not (sure >= self._least).any():
+        if sure.size and not (sure >= self.least).any():
             raise InputError(
-                f"no keypoint reaches a confidence of {self._least:.2f} in any of {len(frames)} frames; the best has "
+                f"no keypoint reaches a confidence of {self.least:.2f} in any of {len(frames)} frames; the best has "
                 f"{sure.max():.2f}. Train on frames like these, or lower the threshold"
             )
-        points[sure < self._least] = np.nan
+        points[sure < self.least] = np.nan
         return PointSeries(time, points, "px")
 
     def locate(self, frames: Frames) -> tuple[FloatArray, FloatArray]:
@@ -185,7 +185,8 @@ class HeatmapExtractor(KeypointExtractor):
         return inside, np.concatenate([part[1] for part in parts])
 
     @property
-    def _least(self) -> float:
+    def least(self) -> float:
+        """The confidence below which a keypoint is NaN [1]; after :meth:`fit`, or with weights."""
         return float(self._about["threshold"]) if self.threshold is None else self.threshold
 
     @cached_property

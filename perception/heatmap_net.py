@@ -1,7 +1,6 @@
 """The network of ``heatmap``: ResNet-34, and a light head that draws one heatmap a keypoint."""
 
 import math
-from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -14,6 +13,8 @@ MULTIPLE = 32
 #: Feature maps of ResNet-34, at strides 2, 4, 8, 16 and 32.
 _CHANNELS = (64, 64, 128, 256, 512)
 _WIDTH = 64
+#: On a heatmap of so many cells a keypoint is seen as likely as not before anything is learned.
+_CELLS = 32.0**2
 
 
 class HeatmapNet(nn.Module):
@@ -36,9 +37,9 @@ class HeatmapNet(nn.Module):
         from monai.networks.nets.resnet import ResNetFeatures
 
         super().__init__()
-        self.backbone: Any = ResNetFeatures("resnet34", pretrained=False, spatial_dims=2, in_channels=3)
+        self.backbone = ResNetFeatures("resnet34", pretrained=False, spatial_dims=2, in_channels=3)
         if stages == 3:
-            self.backbone.layer4 = nn.Identity()  # type: ignore[assignment]
+            self.backbone.layer4 = nn.Sequential()  # passes on what it is given
         self.stages = stages
         self.lateral = nn.ModuleList(nn.Conv2d(c, _WIDTH, 1) for c in _CHANNELS[: 1 + stages])
         self.smooth = nn.Sequential(
@@ -46,9 +47,8 @@ class HeatmapNet(nn.Module):
         )
         self.draw = nn.Conv2d(_WIDTH, keypoints, 1)
         nn.init.normal_(self.draw.weight, std=0.01)
-        # before anything is learned a keypoint is seen as likely as not, on a picture of 48 x 48 cells
         assert self.draw.bias is not None
-        nn.init.constant_(self.draw.bias, -math.log(48.0**2))
+        nn.init.constant_(self.draw.bias, -math.log(_CELLS))
 
     def forward(self, pictures: Tensor) -> Tensor:
         """Logits ``(N, K, H / 2, W / 2)`` of pictures ``(N, 3, H, W)`` from 0 to 1; sides are multiples of 32."""

@@ -113,7 +113,7 @@ def train(
             batch = _with_blanks(*_augmented(augment, images[chosen], points[chosen]))
             loss = _loss(net, *(part.to(device) for part in batch))
             optimiser.zero_grad()
-            loss.backward()  # type: ignore[no-untyped-call]
+            torch.autograd.backward(loss)
             torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             optimiser.step()
             schedule.step()

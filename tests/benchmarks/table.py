@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 RESULTS = Path(__file__).resolve().parents[2] / "results"
-PACKAGES = ("muslin", "mujoco", "pybullet", "torch", "numpy", "scipy")
+PACKAGES = ("muslin", "mujoco", "pybullet", "torch", "monai", "kornia", "numpy", "scipy")
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def test_files_that_are_not_its_weights_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read as weights"):
         HeatmapExtractor(weights=path)
     save_weights(path, "transporter", {"a": np.zeros(1)}, {})
-    with pytest.raises(InputError, match=r"'?transporter'?, not of extractor 'heatmap'"):
+    with pytest.raises(InputError, match="not of extractor 'heatmap'"):
         HeatmapExtractor(weights=path)
     about = {"keypoints": 4, "stages": 3, "height": 64, "width": 64, "threshold": 0.5}
     save_weights(path, "heatmap", {"draw.bias": np.zeros(3)}, about)

@@ -1,0 +1,43 @@
+"""How well keypoints are found in simulated frames; ``results/perception.json``.
+
+One module an extractor, each with ``rows(settings)``; ``--only`` picks some. A smaller run is one with fewer
+``--frames`` and ``--epochs``.
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Callable
+
+from perception_settings import Settings
+from table import Row, report
+
+
+def _heatmap(settings: Settings) -> list[Row]:
+    from perception_heatmap import rows
+
+    return rows(settings)
+
+
+EXTRACTORS: dict[str, Callable[[Settings], list[Row]]] = {"heatmap": _heatmap}
+
+
+def main() -> None:
+    default = Settings()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", nargs="*", choices=list(EXTRACTORS), default=list(EXTRACTORS))
+    parser.add_argument("--scenarios", nargs="*", default=default.scenarios)
+    parser.add_argument("--shifts", nargs="*", default=default.shifts, help="measured across engines; of the scenarios")
+    for name in ("frames", "draws", "held_out", "held_out_draws", "epochs", "seed"):
+        parser.add_argument(f"--{name.replace('_', '-')}", type=int, default=getattr(default, name))
+    given = vars(parser.parse_args())
+    only = given.pop("only")
+    settings = Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
+    began = time.monotonic()
+    rows = [row for name in only for row in EXTRACTORS[name](settings)]
+    report("perception", rows, [settings.seed, settings.seed + 1000], time.monotonic() - began)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("OMP_NUM_THREADS", str(len(os.sched_getaffinity(0))))
+    main()

@@ -1,0 +1,26 @@
+"""Sizes of the measurement of perception."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Sizes of the measurement.
+
+    Args:
+        scenarios: built-in ones.
+        shifts: those of them that are also rendered from the other engine, and measured across.
+        frames, draws: that are learned from, and of how many draws of the prior they are.
+        held_out, held_out_draws: the same that are measured on, of other draws.
+        epochs: of training at most.
+        seed: of draws, looks, cameras and weights; held-out draws have this plus 1000.
+    """
+
+    scenarios: tuple[str, ...] = ("wiping", "fling", "winding")
+    shifts: tuple[str, ...] = ("fling",)
+    frames: int = 240
+    draws: int = 8
+    held_out: int = 60
+    held_out_draws: int = 4
+    epochs: int = 20
+    seed: int = 0
