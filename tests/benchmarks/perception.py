@@ -19,7 +19,13 @@ def _heatmap(settings: Settings) -> list[Row]:
     return rows(settings)
 
 
-EXTRACTORS: dict[str, Callable[[Settings], list[Row]]] = {"heatmap": _heatmap}
+def _transporter(settings: Settings) -> list[Row]:
+    from perception_transporter import figures
+
+    return figures(settings)
+
+
+EXTRACTORS: dict[str, Callable[[Settings], list[Row]]] = {"heatmap": _heatmap, "transporter": _transporter}
 
 
 def main() -> None:
@@ -27,8 +33,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="*", choices=list(EXTRACTORS), default=list(EXTRACTORS))
     parser.add_argument("--scenarios", nargs="*", default=default.scenarios)
+    parser.add_argument("--keypoints", nargs="*", type=int, default=default.keypoints, help="of transporter")
     parser.add_argument("--shifts", nargs="*", default=default.shifts, help="measured across engines; of the scenarios")
-    for name in ("frames", "draws", "held_out", "held_out_draws", "epochs", "seed"):
+    for name in ("frames", "draws", "held_out", "held_out_draws", "epochs", "steps", "seed"):
         parser.add_argument(f"--{name.replace('_', '-')}", type=int, default=getattr(default, name))
     given = vars(parser.parse_args())
     only = given.pop("only")

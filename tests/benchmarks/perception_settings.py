@@ -12,7 +12,9 @@ class Settings:
         shifts: those of them that are also rendered from the other engine, and measured across.
         frames, draws: that are learned from, and of how many draws of the prior they are.
         held_out, held_out_draws: the same that are measured on, of other draws.
-        epochs: of training at most.
+        epochs: of training ``heatmap`` at most.
+        keypoints: of ``transporter``.
+        steps: of its training.
         seed: of draws, looks, cameras and weights; held-out draws have this plus 1000.
     """
 
@@ -23,4 +25,6 @@ class Settings:
     held_out: int = 60
     held_out_draws: int = 4
     epochs: int = 20
+    keypoints: tuple[int, ...] = (4,)
+    steps: int = 600
     seed: int = 0

@@ -11,9 +11,6 @@ takes that were not learned from:
 - the Chamfer distance between keypoints and the object's pixels.
 """
 
-import argparse
-import json
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,6 +18,8 @@ from typing import Any
 
 import numpy as np
 from paper_scene import SETTINGS, Setting
+from perception_settings import Settings
+from table import Row
 
 from muslin.core.arrays import BoolArray, FloatArray
 from muslin.core.camera import Camera
@@ -38,28 +37,18 @@ NEAR = 10.0
 HALF_WIDTH, REACH = 12, 6
 ROBOT_COLOUR = (40, 44, 60)
 VARIANTS = ("no robot", "robot left out", "robot in the loss")
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Sizes of the measurement.
-
-    Args:
-        scenarios: of the paper.
-        keypoints: numbers of keypoints.
-        takes, held_out: that are learned from, and measured on.
-        steps: of the training.
-        variants: of :data:`VARIANTS`.
-        seed: of draws, weights and pairs.
-    """
-
-    scenarios: Sequence[str] = tuple(SETTINGS)
-    keypoints: Sequence[int] = (4, 8)
-    takes: int = 8
-    held_out: int = 4
-    steps: int = 600
-    variants: Sequence[str] = VARIANTS
-    seed: int = 1
+#: What is measured, how it is told, and its unit.
+FIGURES = {
+    "consistency": ("within 10 px of its own spot", "share of keypoints and frames"),
+    "grid_consistency": ("the same of a fixed grid", "share of points and frames"),
+    "on_object": ("on the object, of those given", "share"),
+    "grid_on_object": ("the same of a fixed grid", "share"),
+    "given": ("given", "share of keypoints and frames"),
+    "chamfer_px": ("Chamfer to the object's pixels", "px of 320"),
+    "grid_chamfer_px": ("the same of a fixed grid", "px of 320"),
+    "training_s": ("training", "s"),
+    "frames_per_second": ("extraction", "frames/s"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,8 +128,10 @@ def grid(mask: BoolArray, count: int) -> FloatArray:
     return np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
 
 
-def measure(setting: Setting, known: Seen, fresh: Seen, camera: Camera, variant: str, count: int, s: Settings) -> Any:
-    """One row."""
+def measure(
+    setting: Setting, known: Seen, fresh: Seen, camera: Camera, variant: str, count: int, s: Settings
+) -> dict[str, float]:
+    """The numbers of :data:`FIGURES`."""
     extractor = TransporterExtractor(keypoints=count, steps=s.steps, seed=s.seed)
     began = time.perf_counter()
     extractor.fit(known.frames(variant))
@@ -157,11 +148,6 @@ def measure(setting: Setting, known: Seen, fresh: Seen, camera: Camera, variant:
     on = np.stack([on_mask(p, m) for p, m in zip(found, mask, strict=True)])
     on_grid = np.stack([on_mask(p, m) for p, m in zip(baseline[1], mask, strict=True)])
     return {
-        "scenario": setting.name,
-        "keypoints": count,
-        "variant": variant,
-        "frames": len(known.rgb),
-        "steps": s.steps,
         "given": float(given.mean()),
         "on_object": float(on[given].mean()) if given.any() else 0.0,
         "consistency": consistency(found, after, spots(learned, before, in_view)),
@@ -179,34 +165,19 @@ def _projected(setting: Setting, camera: Camera, seen: Seen) -> tuple[FloatArray
     return camera.project(seen.vertices)[0], visible(setting.scene(), camera, seen.vertices, seen.vertices)
 
 
-def rows(settings: Settings) -> list[dict[str, Any]]:
-    """Every scenario, variant and number of keypoints."""
-    made = []
+def figures(settings: Settings) -> list[Row]:
+    """Every scenario, number of keypoints and variant."""
+    made: list[Row] = []
     for name in settings.scenarios:
         setting = SETTINGS[name]
         camera = setting.camera()
-        known = seen_takes(setting, camera, settings.takes, settings.seed)
-        fresh = seen_takes(setting, camera, settings.held_out, settings.seed + 1000)
+        known = seen_takes(setting, camera, settings.draws, settings.seed + 1)
+        fresh = seen_takes(setting, camera, settings.held_out_draws, settings.seed + 1001)
         for count in settings.keypoints:
-            for variant in settings.variants:
-                made.append(measure(setting, known, fresh, camera, variant, count, settings))
-                print(json.dumps(made[-1]), flush=True)
+            for variant in VARIANTS:
+                found = measure(setting, known, fresh, camera, variant, count, settings)
+                what = f"transporter {name}, {count} keypoints, {variant}"
+                for key, (figure, unit) in FIGURES.items():
+                    made.append(Row(f"{what}: {figure}", found[key], unit))
+                    print(f"{made[-1].figure}: {made[-1].value:.4g} {unit}", flush=True)
     return made
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    default = Settings()
-    parser.add_argument("--scenarios", nargs="*", choices=list(SETTINGS), default=default.scenarios)
-    parser.add_argument("--keypoints", nargs="*", type=int, choices=[2, 4, 6, 8], default=default.keypoints)
-    parser.add_argument("--variants", nargs="*", choices=VARIANTS, default=default.variants)
-    parser.add_argument("--takes", type=int, default=default.takes, help="that are learned from")
-    parser.add_argument("--held-out", type=int, default=default.held_out, help="that are measured on")
-    parser.add_argument("--steps", type=int, default=default.steps, help="of the training")
-    parser.add_argument("--seed", type=int, default=default.seed)
-    rows(Settings(**vars(parser.parse_args())))
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("OMP_NUM_THREADS", str(len(os.sched_getaffinity(0))))
-    main()
