@@ -9,7 +9,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from ..core.version import __version__
-from . import bench, calibrate, inspection, next, recordings, render, simulators, starting, steps, unknown
+from . import annotate, bench, calibrate, inspection, next, recordings, render, simulators, starting, steps, unknown
 from .failure import INTERRUPTED, describe, usage_text
 
 app = typer.Typer(
@@ -42,7 +42,7 @@ def _options(
     """Options of every command."""
 
 
-for _group in (recordings, starting, steps, next, unknown, calibrate, inspection, render, bench, simulators):
+for _group in (recordings, annotate, starting, steps, next, unknown, calibrate, inspection, render, bench, simulators):
     _group.add_to(app)
 
 
