@@ -49,11 +49,15 @@ def read_image(path: Path, size: tuple[int, int] | None = None) -> Image:
 
 def write_image(path: Path, picture: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> None:
     """Write a PNG: red green blue ``(h, w, 3)``, or one channel ``(h, w)``."""
-    cv2 = _cv2()
-    done, data = cv2.imencode(".png", picture[..., ::-1] if picture.ndim == 3 else picture)
+    path.write_bytes(png(picture))
+
+
+def png(picture: npt.NDArray[np.uint8] | npt.NDArray[np.uint16]) -> bytes:
+    """The bytes of a PNG: red green blue ``(h, w, 3)``, or one channel ``(h, w)``."""
+    done, data = _cv2().imencode(".png", picture[..., ::-1] if picture.ndim == 3 else picture)
     if not done:
-        raise StoreError(f"cannot write {path}: OpenCV cannot encode a picture of shape {picture.shape}")
-    path.write_bytes(data.tobytes())
+        raise StoreError(f"OpenCV cannot encode a picture of shape {picture.shape} as PNG")
+    return bytes(data)
 
 
 def millimetres(depth: DepthImage) -> npt.NDArray[np.uint16]:

@@ -10,6 +10,7 @@ import typer
 
 from ..core.version import __version__
 from . import (
+    annotate,
     bench,
     calibrate,
     camera,
@@ -59,6 +60,7 @@ def _options(
 for _group in (
     recordings,
     camera,
+    annotate,
     extracting,
     starting,
     steps,

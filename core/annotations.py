@@ -72,8 +72,8 @@ class Annotations:
 
     def _outside(self) -> npt.NDArray[np.bool_]:
         """``(N, K)``: farther than half a pixel beyond the edge of a picture whose size is known."""
-        beyond = (self.points < -1.0) | (self.points > self.sizes[:, None])
-        known = np.asarray((self.sizes > 0).all(axis=1))
+        beyond: npt.NDArray[np.bool_] = np.logical_or(self.points < -1.0, self.points > self.sizes[:, None])
+        known: npt.NDArray[np.bool_] = np.all(self.sizes > 0, axis=1)
         return np.asarray(beyond.any(axis=2) & known[:, None])
 
     def __len__(self) -> int:
