@@ -52,8 +52,8 @@ class HeatmapExtractor(KeypointExtractor):
         InputError: an option that cannot be; MissingFileError: no such file of weights.
 
     References:
-        Sundaresan et al., *Learning rope manipulation policies using dense object descriptors trained on synthetic
-        depth data*, 2020: heatmaps for the keypoints of ropes and cloth.
+        Grannen, Sundaresan et al., *Untangling dense knots by learning task-relevant keypoints*, 2020: annotated and
+            augmented pictures, one Gaussian heatmap a keypoint.
         He et al., *Deep Residual Learning for Image Recognition*, 2016: the backbone, ResNet-34.
     """
 

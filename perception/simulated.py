@@ -22,7 +22,7 @@ from ..core.visibility import visible
 from .randomisation import random_appearance, shaken
 
 #: Frames of a draw of the prior that look alike: they share one appearance and one camera.
-_ALIKE = 5
+_ALIKE = 2
 #: Seconds of computation after which a draw is given up, and draws that may fail before it is.
 _TIME_LIMIT, _FAILURES = 60.0, 10
 
