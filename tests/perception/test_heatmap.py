@@ -120,7 +120,7 @@ def test_files_that_are_not_its_weights_are_told(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def learned() -> HeatmapExtractor:
-    extractor = HeatmapExtractor(epochs=8, seed=1)
+    extractor = HeatmapExtractor(epochs=18)
     before = torch.random.get_rng_state()
     extractor.fit(FRAMES, POINTS)
     assert torch.equal(torch.random.get_rng_state(), before)
@@ -131,7 +131,7 @@ def learned() -> HeatmapExtractor:
 def test_it_learns_where_two_squares_are(learned: HeatmapExtractor) -> None:
     found, _ = learned.locate(FRAMES)
     apart = np.linalg.norm(found - POINTS, axis=2)
-    assert np.nanmedian(apart) < 3.0
+    assert np.nanmedian(apart) < 2.0
     assert 0.0 < learned._about["threshold"] < 1.0
 
 
