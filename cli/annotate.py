@@ -80,7 +80,7 @@ def annotate(
         write_coco(annotations, output)
     elif begun is not None:
         say(f"going on with {output}: {_told(annotations)}")
-    after = command("train", "heatmap", video, "--keypoints", output, "-o", output.with_suffix(".safetensors"))
+    after = command("train", "heatmap", video, "--annotations", output, "-o", output.with_suffix(".safetensors"))
     session = Session(annotations, places(annotations, frames), frames, output)
     _serve(AnnotationServer(session, after), browser)
     _summary(session.finish(), output, after, command("annotate", video, "-o", output))

@@ -171,7 +171,7 @@ def test_a_killed_one_leaves_a_whole_file_and_is_gone_on_with(page: Page, folder
     assert again.state()["frames"][0]["points"][0]["u"] == kept
     status, out, error = again.end(signal.SIGINT)
     assert (status, error) == (0, "") and "wrote k.json: 1 of 6 frames annotated" in out
-    assert "next: muslin train heatmap v.zarr --keypoints k.json -o k.safetensors" in out
+    assert "next: muslin train heatmap v.zarr --annotations k.json -o k.safetensors" in out
 
 
 def test_done_on_the_page_ends_it(page: Page, folder: Path) -> None:
