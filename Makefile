@@ -59,7 +59,7 @@ bench-inference: $(VENV)/.ready-bench
 bench-paper: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/paper.py $(PAPER)
 
-# some 20 minutes; PERCEPTION="--scenarios wiping --shifts --frames 60 --epochs 5" for a small one
+# trains over a dozen networks, for hours on two cores; PERCEPTION="--only heatmap --scenarios wiping --shifts" for one of them
 bench-perception: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/perception.py $(PERCEPTION)
 

@@ -1,7 +1,7 @@
 """How well keypoints are found in simulated frames; ``results/perception.json``.
 
-One module an extractor, each with ``rows(settings)``; ``--only`` picks some. A smaller run is one with fewer
-``--frames`` and ``--epochs``.
+One module an extractor, each with a function of the settings; ``--only`` picks some. A smaller run is one with fewer
+``--frames``, ``--epochs`` and ``--steps``.
 """
 
 import argparse
