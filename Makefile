@@ -13,7 +13,7 @@ PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
-	@echo "setting up $(VENV) (about a minute, torch as a CPU build)"
+	@echo "setting up $(VENV) (some minutes, torch as a CPU build)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(PIP) install -c constraints.txt -e '.[all]' 2>/dev/null || $(BIN)/pip install -c constraints.txt -e '.[all]'
 	@touch $@

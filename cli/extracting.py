@@ -50,6 +50,8 @@ def extract(
     if output.exists() and not force:
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
     finder, options = _extractor(extractor, option or [], weights)
+    if not finder.ready:
+        raise InputError(f"extractor {extractor!r} has not learned yet; give --weights FILE, which muslin train writes")
     videos = load_videos(video)
     made: list[Recording] = []
     began = time.perf_counter()
@@ -97,7 +99,8 @@ def train(
         raise InputError(f"extractor {extractor!r} learns nothing; use it at once: muslin extract")
     frames, keypoints = _annotated(video, annotations) if annotations else (_all(load_videos(video)), None)
     began = time.perf_counter()
-    finder.fit(frames, keypoints)
+    with ProgressView() as progress:
+        finder.fit(frames, keypoints, progress)
     save(output)
     what = "annotated frames" if annotations else "frames"
     say(f"wrote {output}: {extractor!r}, trained on {len(frames)} {what} in {time.perf_counter() - began:.0f} s")

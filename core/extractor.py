@@ -1,7 +1,7 @@
 """Keypoint extractors: frames to point series."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -28,9 +28,22 @@ class KeypointExtractor(ABC):
     #: Options with which one that learns does so in seconds, however badly; the conformance kit takes them.
     quick: ClassVar[Mapping[str, object]] = {}
 
-    def fit(self, frames: Frames | npt.NDArray[np.uint8], keypoints: FloatArray | None = None) -> None:
-        """Learn from ``frames (N, H, W, 3)``, and ``keypoints (N, K, 2)`` [px] where they are annotated."""
+    def fit(
+        self,
+        frames: Frames | npt.NDArray[np.uint8],
+        keypoints: FloatArray | None = None,
+        progress: Callable[[str, int, int], None] | None = None,
+    ) -> None:
+        """Learn from ``frames (N, H, W, 3)``, and ``keypoints (N, K, 2)`` [px] where they are annotated.
+
+        ``progress`` is told what is done, how much of it, and of how much.
+        """
         return None
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can look: it need not learn, or has learned."""
+        return True
 
     @abstractmethod
     def extract(self, source: PointSeries | Frames | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -11,15 +10,14 @@ import numpy.typing as npt
 import torch
 
 from ..core.arrays import FloatArray
-from ..core.errors import InputError, StepMissingError
-from ..core.extractor import KeypointExtractor
+from ..core.errors import InputError
 from ..core.frames import Frames
 from ..core.series import PointSeries
 from ..core.version import __version__
 from .heatmap_net import HeatmapNet
 from .heatmap_peaks import Peak
 from .heatmap_training import Learned, Training, as_tensor, located, moved, shrunk, train
-from .weights import Arrays, load_weights, save_weights
+from .learned import LearnedExtractor
 
 Preset = Literal["small", "paper"]
 #: Working size [px], stages of ResNet-34 and training of each preset; 12 copies make 3000 pictures of 250.
@@ -33,7 +31,7 @@ FEWEST = 4
 _BATCH = 16
 
 
-class HeatmapExtractor(KeypointExtractor):
+class HeatmapExtractor(LearnedExtractor):
     """Learns from annotated frames where keypoints are, and where they are hidden.
 
     Args:
@@ -58,7 +56,7 @@ class HeatmapExtractor(KeypointExtractor):
     """
 
     name: ClassVar[str] = "heatmap"
-    needs_images: ClassVar[bool] = True
+    described: ClassVar[tuple[str, ...]] = ("keypoints", "stages", "height", "width", "threshold")
     reports_unseen: ClassVar[bool] = True
     quick: ClassVar[Mapping[str, object]] = {"epochs": 8, "size": 32}
 
@@ -85,13 +83,7 @@ class HeatmapExtractor(KeypointExtractor):
         its_size, self.stages, its_training = PRESETS[preset]
         self.peak, self.threshold, self.size = peak, threshold, size or its_size
         self.training = replace(its_training, epochs=epochs or its_training.epochs, seed=seed)
-        self.device = device
-        _device(device)
-        self._arrays: Arrays = {}
-        self._about: dict[str, Any] = {}
-        if weights:
-            self._arrays, self._about = load_weights(Path(weights), self.name)
-            _check_about(Path(weights), self._arrays, self._about)
+        super().__init__(weights, device)
 
     @property
     def keypoints(self) -> int:
@@ -121,10 +113,8 @@ class HeatmapExtractor(KeypointExtractor):
         with torch.random.fork_rng():
             torch.manual_seed(self.training.seed)
             net = HeatmapNet(points.shape[1], self.stages)
-            learned = train(net, pictures, points, self.training, _device(self.device), progress)
-        self._arrays = {name: value.cpu().numpy() for name, value in net.state_dict().items()}
-        self._about = self._described(given, pictures.shape[1:3], points.shape[1], learned)
-        self.__dict__.pop("_net", None)
+            learned = train(net, pictures, points, self.training, self._device(), progress)
+        self._learned(net, self._described(given, pictures.shape[1:3], points.shape[1], learned))
 
     def _described(self, given: Frames, shape: tuple[int, ...], count: int, learned: Learned) -> dict[str, Any]:
         scale = given.rgb.shape[2] / shape[1]
@@ -140,11 +130,6 @@ class HeatmapExtractor(KeypointExtractor):
             "epochs": learned.epochs,
             "training": asdict(self.training),
         }
-
-    def save(self, path: str | Path) -> None:
-        """Write the weights to one ``.safetensors`` file."""
-        self._must_have_learned()
-        save_weights(Path(path), self.name, self._arrays, self._about)
 
     def extract(self, source: PointSeries | Frames | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
         """Keypoints ``(T, K, 2)`` [px of the frames]; NaN where the confidence is below the threshold.
@@ -174,8 +159,7 @@ class HeatmapExtractor(KeypointExtractor):
         """
         self._must_have_learned()
         given, shape = frames.rgb.shape[1:3], (int(self._about["height"]), int(self._about["width"]))
-        device = _device(self.device)
-        net = self._net.to(device)
+        device, net = self._device(), self._net
         parts = []
         for begin in range(0, len(frames), _BATCH):
             pictures = shrunk(frames.rgb[begin : begin + _BATCH], self.size, shape)
@@ -189,29 +173,8 @@ class HeatmapExtractor(KeypointExtractor):
         """The confidence below which a keypoint is NaN [1]; after :meth:`fit`, or with weights."""
         return float(self._about["threshold"]) if self.threshold is None else self.threshold
 
-    @cached_property
-    def _net(self) -> HeatmapNet:
-        net = HeatmapNet(self.keypoints, int(self._about["stages"]))
-        net.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in self._arrays.items()})
-        return net.eval()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k != "_net"}
-
-    def _must_have_learned(self) -> None:
-        if not self._arrays:
-            raise StepMissingError(
-                "extractor 'heatmap' has not learned yet; train it with: muslin train heatmap VIDEO.zarr "
-                "-o FILE.safetensors, and give it that file as weights"
-            )
-
-
-def _device(name: str) -> torch.device:
-    if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"device must be 'auto', 'cpu' or 'cuda', not {name!r}")
-    if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("device is 'cuda', but torch finds no GPU here; use device = 'auto' or 'cpu'")
-    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
+    def _build(self) -> HeatmapNet:
+        return HeatmapNet(self.keypoints, int(self._about["stages"]))
 
 
 def _checked(frames: Frames, keypoints: FloatArray | None) -> FloatArray:
@@ -243,12 +206,3 @@ def _checked(frames: Frames, keypoints: FloatArray | None) -> FloatArray:
     points = points.copy()
     points[~seen] = np.nan
     return points
-
-
-def _check_about(path: Path, arrays: Arrays, about: dict[str, Any]) -> None:
-    """The description must fit the arrays: a file may have been edited, or be of another version."""
-    drawn = arrays.get("draw.bias")
-    missing = [k for k in ("keypoints", "stages", "height", "width", "threshold") if k not in about]
-    if missing or drawn is None or len(drawn) != about["keypoints"]:
-        what = f"no {missing[0]}" if missing else f"{0 if drawn is None else len(drawn)} heatmaps"
-        raise InputError(f"{path} does not describe a trained 'heatmap' ({what}); train the extractor again")

@@ -2,28 +2,26 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 import torch
 
 from ..core.arrays import FloatArray
-from ..core.errors import InputError, StepMissingError
-from ..core.extractor import KeypointExtractor
+from ..core.errors import InputError
 from ..core.frames import Frames
 from ..core.series import PointSeries
+from .learned import LearnedExtractor
 from .transporter_net import Transporter
 from .transporter_training import Training, as_tensor, shrunk, train
-from .weights import Arrays, load_weights, save_weights
 
 #: Frames that go through the network together.
 _BATCH = 32
 
 
-class TransporterExtractor(KeypointExtractor):
+class TransporterExtractor(LearnedExtractor):
     """Transporter: keypoints learned from frames alone.
 
     A network encodes pictures as features, finds K places in them, and must make a target picture from the features of
@@ -37,6 +35,7 @@ class TransporterExtractor(KeypointExtractor):
         size: pixels of the longer edge of the working picture.
         steps, batch, window, seed: of the training, see :class:`~.transporter_training.Training`.
         confidence: a keypoint is NaN where less than this share of its heatmap lies around it.
+        device: ``"auto"`` (a GPU where there is one), ``"cpu"`` or ``"cuda"``.
 
     Raises:
         InputError: an option that cannot be; MissingFileError: no such file of weights.
@@ -46,7 +45,7 @@ class TransporterExtractor(KeypointExtractor):
     """
 
     name: ClassVar[str] = "transporter"
-    needs_images: ClassVar[bool] = True
+    described: ClassVar[tuple[str, ...]] = ("keypoints", "size", "height", "width")
     quick: ClassVar[Mapping[str, object]] = {"steps": 10, "size": 32}
 
     def __init__(
@@ -59,6 +58,7 @@ class TransporterExtractor(KeypointExtractor):
         window: int = Training.window,
         confidence: float = 0.3,
         seed: int = 0,
+        device: str = "auto",
     ) -> None:
         for what, number, least, most in (
             ("keypoints", keypoints, 1, 64),
@@ -74,10 +74,8 @@ class TransporterExtractor(KeypointExtractor):
         self.keypoints, self.size, self.confidence = keypoints, size, confidence
         self.training = Training(steps, batch, window, seed=seed)
         self.losses: list[float] = []
-        self._arrays: Arrays = {}
-        self._about: dict[str, Any] = {}
+        super().__init__(weights, device)
         if weights:
-            self._arrays, self._about = load_weights(Path(weights), self.name)
             self.keypoints, self.size = int(self._about["keypoints"]), int(self._about["size"])
 
     def fit(
@@ -100,17 +98,10 @@ class TransporterExtractor(KeypointExtractor):
         with torch.random.fork_rng():
             torch.manual_seed(self.training.seed)
             net = Transporter(self.keypoints)
-            self.losses = train(net, given, self.size, self.training, _device(), progress)
-        self._arrays = {name: value.cpu().numpy() for name, value in net.state_dict().items()}
+            self.losses = train(net, given, self.size, self.training, self._device(), progress)
         height, width = given.rgb.shape[1:3]
         about = {"keypoints": self.keypoints, "size": self.size, "height": height, "width": width}
-        self._about = about | {"frames": len(given), "training": asdict(self.training)}
-        self.__dict__.pop("_net", None)
-
-    def save(self, path: Path) -> None:
-        """Write the weights to one ``.safetensors`` file."""
-        self._must_have_learned()
-        save_weights(Path(path), self.name, self._arrays, self._about)
+        self._learned(net, about | {"frames": len(given), "training": asdict(self.training)})
 
     def extract(self, source: PointSeries | Frames | npt.NDArray[np.uint8], time: FloatArray) -> PointSeries:
         """Keypoints ``(T, K, 2)`` [px of the frames]; NaN where the heatmap has no clear peak.
@@ -142,30 +133,12 @@ class TransporterExtractor(KeypointExtractor):
 
     def _located(self, frames: Frames) -> tuple[FloatArray, FloatArray]:
         """Places ``(T, K, 2)`` from -1 to 1, and how sure they are ``(T, K)``."""
-        device, found = _device(), []
-        net = self._net.to(device)
+        device, net, found = self._device(), self._net, []
         with torch.no_grad():
             for begin in range(0, len(frames), _BATCH):
                 pictures = as_tensor(shrunk(frames.rgb[begin : begin + _BATCH], self.size)).to(device)
                 found.append([part.cpu().numpy().astype(float) for part in net.locate(pictures)])
         return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
 
-    @cached_property
-    def _net(self) -> Transporter:
-        net = Transporter(self.keypoints)
-        net.load_state_dict({name: torch.from_numpy(value.copy()) for name, value in self._arrays.items()})
-        return net.eval()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {k: v for k, v in self.__dict__.items() if k != "_net"}
-
-    def _must_have_learned(self) -> None:
-        if not self._arrays:
-            raise StepMissingError(
-                "extractor 'transporter' has not learned yet; train it with: muslin train transporter VIDEO.zarr "
-                "-o FILE.safetensors, and give it that file as weights"
-            )
-
-
-def _device() -> torch.device:
-    return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    def _build(self) -> Transporter:
+        return Transporter(self.keypoints)

@@ -129,6 +129,11 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if isinstance(options.get("weights"), str):
         options["weights"] = str(folder / options["weights"])
     extractor = _plugin("extractor", config.extractor.name, options)
+    if not extractor.ready:
+        raise InputError(
+            f"[extractor]: {config.extractor.name!r} has not learned yet; name the file that muslin train wrote: "
+            "weights = FILE"
+        )
     scenarios = {n: build_scenario(config.scenario, r, folder, extractor.uses_markers) for n, r in recordings.items()}
     kind = scenarios[fit_on[0]].body.kind
     material = with_fields(base.default_material(kind), dict(config.material))

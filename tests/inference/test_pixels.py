@@ -52,6 +52,12 @@ def test_pixels_without_their_camera_are_refused(tmp_path: Path) -> None:
         build_problem(parse_config(small_config(), "test"), blind)
 
 
+def test_an_extractor_that_has_not_learned_is_refused_at_once() -> None:
+    pytest.importorskip("monai")
+    with pytest.raises(InputError, match=r"'heatmap' has not learned yet; name the file that muslin train wrote"):
+        build_problem(parse_config(small_config() | {"extractor": {"name": "heatmap"}}, "test"), seen())
+
+
 def test_what_lies_beyond_the_edge_keeps_its_place_and_what_lies_behind_is_not_seen() -> None:
     camera = Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
     points = np.array([[[0.0, 0.0, 1.0], [2.0, 0.0, 1.0], [0.0, 0.0, -1.0]]] * 2)

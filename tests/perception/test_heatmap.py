@@ -114,7 +114,10 @@ def test_files_that_are_not_its_weights_are_told(tmp_path: Path) -> None:
         HeatmapExtractor(weights=path)
     about = {"keypoints": 4, "stages": 3, "height": 64, "width": 64, "threshold": 0.5}
     save_weights(path, "heatmap", {"draw.bias": np.zeros(3)}, about)
-    with pytest.raises(InputError, match="3 heatmaps"):
+    with pytest.raises(InputError, match=r"these weights are not of this 'heatmap'.*Train it again"):
+        HeatmapExtractor(weights=path).extract(FRAMES, TIME)
+    save_weights(path, "heatmap", {"draw.bias": np.zeros(4)}, {"keypoints": 4})
+    with pytest.raises(InputError, match=r"does not describe a trained 'heatmap' \(no stages\)"):
         HeatmapExtractor(weights=path)
 
 

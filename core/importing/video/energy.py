@@ -14,7 +14,7 @@ from ...motion import Motion
 FAINT = 0.8
 #: Nor is it below so many standard errors of Fisher's z: short signals agree by chance.
 ERRORS = 4.0
-#: Motion must raise the change from frame to frame by this share; the noise of a camera alone does by 0.04.
+#: Motion must raise the change from frame to frame by this share; the noise of a camera alone raises it by less.
 RAISED = 0.1
 #: A second peak as high as this share of the first leaves open which it is.
 RIVAL = 0.9
