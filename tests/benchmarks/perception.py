@@ -8,9 +8,10 @@ import argparse
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from perception_settings import Settings
-from table import Row, report
+from table import Row, report, write
 
 
 def _heatmap(settings: Settings) -> list[Row]:
@@ -41,8 +42,13 @@ def main() -> None:
     only = given.pop("only")
     settings = Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
     began = time.monotonic()
-    rows = [row for name in only for row in EXTRACTORS[name](settings)]
-    report("perception", rows, [settings.seed, settings.seed + 1000], time.monotonic() - began)
+    rows: list[Row] = []
+    seeds = [settings.seed, settings.seed + 1000]
+    for name in only:
+        for scenario in settings.scenarios:
+            rows += EXTRACTORS[name](replace(settings, scenarios=(scenario,)))
+            write("perception", rows, seeds, time.monotonic() - began)
+    report("perception", rows, seeds, time.monotonic() - began)
 
 
 if __name__ == "__main__":

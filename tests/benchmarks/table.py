@@ -51,6 +51,13 @@ def report(name: str, rows: Sequence[Row], seeds: Sequence[int], seconds: float)
         value = f"{r.value:.4g}" if isinstance(r.value, float) else str(r.value)
         goal = f"  goal {r.goal}: {'met' if r.met else 'MISSED'}" if r.goal else ""
         print(f"  {r.figure:<{width}}  {value} {r.unit}{goal}")
+    path = write(name, rows, seeds, seconds)
+    print(f"wrote {path}")
+    return path
+
+
+def write(name: str, rows: Sequence[Row], seeds: Sequence[int], seconds: float) -> Path:
+    """Write the table alone: what a long run has so far."""
     content = {
         "machine": machine(),
         "versions": versions(),
@@ -61,5 +68,4 @@ def report(name: str, rows: Sequence[Row], seeds: Sequence[int], seconds: float)
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    print(f"wrote {path}")
     return path
