@@ -62,6 +62,7 @@ bench-paper: $(VENV)/.ready
 # trains over a dozen networks, for hours on two cores; PERCEPTION="--only heatmap --scenarios wiping --shifts" for one of them
 bench-perception: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/perception.py $(PERCEPTION)
+	$(BIN)/python tests/benchmarks/perception_study.py $(PERCEPTION_STUDY)
 
 bench-calibration: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/calibration.py

@@ -33,7 +33,8 @@ class TransporterExtractor(LearnedExtractor):
             file's.
         keypoints: K.
         size: pixels of the longer edge of the working picture.
-        steps, batch, window, seed: of the training, see :class:`~.transporter_training.Training`.
+        steps, batch, window, focus, seed: of the training, see :class:`~.transporter_training.Training`; for a rope
+            take a ``focus`` of about 3.
         confidence: a keypoint is NaN where less than this share of its heatmap lies around it.
         device: ``"auto"`` (a GPU where there is one), ``"cpu"`` or ``"cuda"``.
 
@@ -56,6 +57,7 @@ class TransporterExtractor(LearnedExtractor):
         steps: int = Training.steps,
         batch: int = Training.batch,
         window: int = Training.window,
+        focus: float = Training.focus,
         confidence: float = 0.3,
         seed: int = 0,
         device: str = "auto",
@@ -69,10 +71,12 @@ class TransporterExtractor(LearnedExtractor):
         ):
             if not least <= number <= most:
                 raise InputError(f"{what} must be {least} to {most}, but is {number}")
+        if not 0.0 <= focus <= 1e6:
+            raise InputError(f"focus must be 0 or more, but is {focus:g}")
         if not 0.0 <= confidence <= 1.0:
             raise InputError(f"confidence must be 0 to 1, but is {confidence:g}")
         self.keypoints, self.size, self.confidence = keypoints, size, confidence
-        self.training = Training(steps, batch, window, seed=seed)
+        self.training = Training(steps, batch, window, focus, seed=seed)
         self.losses: list[float] = []
         super().__init__(weights, device)
         if weights:

@@ -12,6 +12,7 @@ import numpy as np
 from ..effect import Effect
 from ..errors import InputError, RolloutFailed
 from ..extractor import KeypointExtractor
+from ..gaps import bridged
 from ..material import UNITS, Material, with_fields
 from ..measurement import Measurement, Recording
 from ..parameters import Parameter, ParameterSpace
@@ -58,8 +59,10 @@ class Problem:
     def simulate(self, values: Mapping[str, float], recording: str) -> Trajectory:
         """One rollout; ``values`` names material fields, ``scale``, and ``effect.coefficient``.
 
+        Points that the extractor did not find in it are bridged, see :func:`~muslin.core.gaps.bridged`.
+
         Raises:
-            RolloutFailed: see :func:`muslin.core.rollout.rollout`.
+            RolloutFailed: see :func:`muslin.core.rollout.rollout`; or a point is found nowhere in it.
         """
         given: dict[str, float] = {}
         coefficients: dict[str, dict[str, float]] = {}
@@ -83,7 +86,8 @@ class Problem:
                 f"[extractor]: {self.extractor.name!r} gives points in {seen.unit}, but recording {recording!r} is in "
                 f"{scenario.unit}; take another extractor, or extract the recording's points with this one"
             )
-        return replace(trajectory, series=seen)
+        measured = self.recordings[recording].series.valid.any(axis=0) if recording in self.recordings else None
+        return replace(trajectory, series=bridged(seen, measured if seen.correspondence else None))
 
     def points_of(self, recording: str) -> int:
         """How many points a simulated take of ``recording`` has."""

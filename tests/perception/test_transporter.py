@@ -145,6 +145,7 @@ def test_pictures_are_shrunk_to_multiples_of_the_stride() -> None:
         ({"steps": 0}, "steps"),
         ({"batch": 1}, "batch"),
         ({"window": 0}, "window"),
+        ({"focus": -1.0}, "focus must be 0 or more"),
         ({"confidence": 2.0}, "0 to 1"),
     ],
 )
