@@ -72,8 +72,7 @@ def train(
     for step in range(how.steps):
         one, other = _pairs(rng, len(pictures), how.batch, lag)
         source, target = (as_tensor(pictures[k]).to(device) for k in (one, other))
-        differs = (source - target).abs().mean(dim=1, keepdim=True)
-        weight = 1.0 + how.focus * differs / differs.mean().clamp(min=1e-6)
+        weight = focused(source, target, how.focus)
         if kept is not None:
             weight = weight * (kept[one] * kept[other])[:, None].to(device)
         error = (net(source, target) - target) ** 2
@@ -87,6 +86,12 @@ def train(
             progress("training", step + 1, how.steps)
     net.eval()
     return losses
+
+
+def focused(one: Tensor, other: Tensor, focus: float) -> Tensor:
+    """Weights ``(B, 1, H, W)`` of the pixels of pictures ``(B, 3, H, W)``: 1 where they are alike, more elsewhere."""
+    differs = (one - other).abs().mean(dim=1, keepdim=True)
+    return 1.0 + focus * differs / differs.mean().clamp(min=1e-6)
 
 
 def shrunk(rgb: Image, size: int) -> Image:

@@ -86,8 +86,10 @@ class Problem:
                 f"[extractor]: {self.extractor.name!r} gives points in {seen.unit}, but recording {recording!r} is in "
                 f"{scenario.unit}; take another extractor, or extract the recording's points with this one"
             )
-        measured = self.recordings[recording].series.valid.any(axis=0) if recording in self.recordings else None
-        return replace(trajectory, series=bridged(seen, measured if seen.correspondence else None))
+        compared = None
+        if seen.correspondence and recording in self.recordings:
+            compared = np.asarray(self.recordings[recording].series.valid.any(axis=0))
+        return replace(trajectory, series=bridged(seen, compared))
 
     def points_of(self, recording: str) -> int:
         """How many points a simulated take of ``recording`` has."""

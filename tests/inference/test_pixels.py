@@ -9,7 +9,7 @@ from small import TRUTH, small_config, small_measurement
 
 from muslin.core.body import cloth_grid
 from muslin.core.camera import Camera
-from muslin.core.errors import InputError
+from muslin.core.errors import InputError, RolloutFailed
 from muslin.core.measurement import Measurement
 from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.scene import Scene
@@ -18,6 +18,7 @@ from muslin.core.simulated_take import SimulatedTake
 from muslin.core.study import Study, parse_config, write_config
 from muslin.core.study.problem import build_problem
 from muslin.inference.criticism.unknown.unknown import unknown
+from muslin.perception.markers import MarkerExtractor
 
 NOISE = 1.0  # [px]
 
@@ -67,6 +68,38 @@ def test_what_lies_beyond_the_edge_keeps_its_place_and_what_lies_behind_is_not_s
     assert not np.isfinite(take.projected().points[:, 2]).any()
     with pytest.raises(InputError, match="without a camera"):
         replace(take, camera=None).projected()
+
+
+class Distracted(MarkerExtractor):
+    """Misses points of what is simulated, as a detector does that looks at drawn frames."""
+
+    def __init__(self, missed: tuple[slice, int]) -> None:
+        self.missed = missed
+
+    def observe(self, take: SimulatedTake) -> PointSeries:
+        points = take.projected().points.copy()
+        points[self.missed] = np.nan
+        return PointSeries(take.series.time, points, "px")
+
+
+def test_points_that_are_not_found_in_a_simulation_are_bridged() -> None:
+    measurement = seen()
+    problem = build_problem(parse_config(small_config(), "test"), measurement)
+    values = {p.name: getattr(TRUTH, p.name) for p in problem.space}
+    whole = problem.simulate(values, "near").series.points
+    gaps = replace(problem, extractor=Distracted((slice(5, 8), 2)))
+    got = gaps.simulate(values, "near").series.points
+    np.testing.assert_allclose(got[4:9, 2], np.linspace(whole[4, 2], whole[8, 2], 5))  # evenly; frames are, too
+    got[5:8, 2] = whole[5:8, 2]
+    np.testing.assert_array_equal(got, whole)
+    nowhere = replace(problem, extractor=Distracted((slice(None), 2)))
+    with pytest.raises(RolloutFailed, match=r"point 2 \(from 0\) of the recording is found in none of"):
+        nowhere.simulate(values, "near")
+    near = measurement["near"]
+    points = near.series.points.copy()
+    points[:, 2] = np.nan  # nor was it in the recording
+    problem.recordings["near"] = replace(near, series=replace(near.series, points=points))
+    assert np.isfinite(nowhere.simulate(values, "near").series.points).all()
 
 
 @pytest.mark.slow

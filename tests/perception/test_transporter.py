@@ -13,7 +13,7 @@ from muslin.core.errors import InputError, MissingFileError, StepMissingError
 from muslin.core.frames import Frames
 from muslin.perception.transporter import TransporterExtractor
 from muslin.perception.transporter_net import SPREAD, Transporter, gaussians
-from muslin.perception.transporter_training import _pairs, _without_robot, shrunk
+from muslin.perception.transporter_training import _pairs, _without_robot, focused, shrunk
 
 COUNT = 24
 TIME = np.arange(COUNT) / 10.0
@@ -112,6 +112,15 @@ def test_features_are_carried_from_source_to_target() -> None:
         heat = [gaussians(net.locate(p)[0], phi[0].shape[2:]) for p in (source, target)]
     right = (1 - heat[0]) * (1 - heat[1]) * phi[0] + heat[1] * phi[1]
     torch.testing.assert_close(carried[0], right)
+
+
+def test_what_differs_weighs_more_however_thin_it_is() -> None:
+    one, other = torch.zeros(1, 3, 20, 20), torch.zeros(1, 3, 20, 20)
+    other[:, :, 5, :] = 0.5
+    assert (focused(one, other, 0.0) == 1.0).all() and (focused(one, one, 3.0) == 1.0).all()
+    weight = focused(one, other, 3.0)
+    assert (weight[..., 6:, :] == 1.0).all() and weight.mean() == pytest.approx(4.0)
+    torch.testing.assert_close(weight[0, 0, 5], torch.full((20,), 1.0 + 3.0 * 20))
 
 
 def test_pairs_are_of_different_frames_within_the_window() -> None:
