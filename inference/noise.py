@@ -82,9 +82,8 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
         rough = np.concatenate([fourth_differences(p) for p in corresponding] or [np.zeros(0)])
         if len(rough) < 20:
             why = "so few frames" if any(r.series.correspondence for r in recordings) else "unordered points"
-            raise InputError(
-                f"the noise cannot be estimated from {why}; give it in the study: [noise] sd = 0.003 (in metres)"
-            )
+            example = "0.003 (in metres)" if recordings[0].series.unit == "m" else "1.0 (in pixels)"
+            raise InputError(f"the noise cannot be estimated from {why}; give it in the study: [noise] sd = {example}")
         sd, correlation, source = robust_sd(rough), 0.0, "roughness in time"
         error = float(1.2 / np.sqrt(len(rough) / 2))
     if sd <= 0:

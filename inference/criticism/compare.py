@@ -88,6 +88,7 @@ def _held(study: Study, name: str, outcomes: Sequence[Outcome], noise: Noise) ->
         best,
         residual(recording, best.series, noise, offsets_of(study)),
         np.stack(predicted) if predicted else np.zeros((0, *best.series.points.shape)),
+        study.problem.extractor.uses_markers,
     )
 
 

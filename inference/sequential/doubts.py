@@ -36,6 +36,6 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
         if own > 0.5 * noise.sd:
             out.append(
                 "the motion is fast for the frame rate and passes for noise, which is overestimated; "
-                "give it: [noise] sd = ... in metres, or record repeats"
+                f"give it: [noise] sd = ... in {'metres' if noise.unit == 'm' else 'pixels'}, or record repeats"
             )
     return out

@@ -8,7 +8,7 @@ from running import Muslin
 
 from muslin.core.errors import InputError
 from muslin.core.measurement_store import load_measurement, read_found_by
-from muslin.core.study import Study, build_problem, parse_config
+from muslin.core.study import Study, build_problem, parse_config, read_config, write_config
 
 pytest.importorskip("cv2")
 
@@ -37,6 +37,17 @@ def test_a_rendered_take_is_found_again_in_a_simulation_of_it(tmp_path: Path, mu
     assert apart.min(axis=2).max() < 8.0  # 40 pixels of thousands, evenly chosen
     soft = problem.space.as_dict(problem.space.from_unit(np.zeros(len(problem.space))))
     assert not np.array_equal(problem.simulate(soft, "frames").series.points, seen.points)
+
+    config = read_config(study)
+    config.estimator.rounds, config.estimator.draws = 1, 12
+    done = muslin("fit", str(study))
+    assert done.returncode == 2 and "[noise] sd = 1.0 (in pixels)" in done.stderr
+    config.noise.sd = 2.0
+    study.unlink()
+    write_config(config, study)
+    for step, told in (("fit", "best fit"), ("compare", "of the squared error"), ("report", "wrote")):
+        done = muslin(step, str(study))
+        assert done.returncode == 0 and told in (done.stdout + done.stderr).lower(), done.stderr
 
     measured = load_measurement(points)
     table = {

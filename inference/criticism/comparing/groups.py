@@ -46,7 +46,7 @@ def partitions(takes: Sequence[Held]) -> list[Partition]:
         labels = [labels_of(h.scenario) for h in takes]
         known = [x for x in labels if x is not None]
         if len(known) == len(takes):
-            found.append(_partition(title, names, [x[h.partner] for x, h in zip(known, takes, strict=True)]))
+            found.append(_partition(title, names, [h.of_partner(x) for x, h in zip(known, takes, strict=True)]))
     return [p for p in found if p is not None]
 
 
@@ -65,8 +65,11 @@ def _by_frame(held: Held, labels: IntArray) -> IntArray:
 
 
 def _by_contact(held: Held) -> IntArray:
-    """A marker touches something where the vertices that carry it do, by weight."""
-    touching = contact_labels(held.best, held.scenario) == 0
+    """A marker touches something where the vertices that carry it do, by weight; other points as their vertex does."""
+    labels = contact_labels(held.best, held.scenario)
+    if not held.marked:
+        return held.of_partner(labels)
+    touching = labels == 0
     carried: FloatArray = touching @ np.abs(held.scenario.markers).T
     whole = np.abs(held.scenario.markers).sum(axis=1)
     points = np.where(carried >= 0.5 * whole, 0, 1)

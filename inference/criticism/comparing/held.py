@@ -25,6 +25,7 @@ class Held:
         best: the prediction.
         residual: measured minus predicted, offsets taken out.
         draws: predictions of posterior draws ``(K, T, Q, A)`` [unit].
+        marked: the predicted points are the markers of the scenario, and were not found in pictures.
     """
 
     recording: Recording
@@ -33,6 +34,7 @@ class Held:
     best: Trajectory
     residual: Residual
     draws: FloatArray
+    marked: bool = True
 
     @property
     def name(self) -> str:
@@ -61,6 +63,31 @@ class Held:
         return out
 
     @cached_property
+    def vertex(self) -> IntArray:
+        """The vertex that each predicted point lies on, or nearest to ``(T, Q)``: in the rest shape if it is a marker,
+        else in every frame, as the camera sees it where points are pixels.
+        """
+        model, body = self.best.series.points, self.scenario.body
+        if self.marked:
+            near = cKDTree(body.vertices).query(self.scenario.markers @ body.vertices)[1]
+            return np.tile(near, (len(model), 1))
+        shapes = self.best.vertices
+        if self.best.series.unit == "px":
+            assert self.scenario.camera is not None
+            shapes = self.scenario.camera.project(shapes)[0]
+        return np.stack([_nearest(v, p) for v, p in zip(shapes, model, strict=True)])
+
+    @property
+    def usual_vertex(self) -> IntArray:
+        """The vertex that each predicted point lies on most often ``(Q,)``."""
+        return np.array([np.bincount(v).argmax() for v in self.vertex.T])
+
+    def of_partner(self, by_vertex: IntArray) -> IntArray:
+        """What belongs to a vertex ``(V,)``, or to it at each time ``(T, V)``, of each measured point's ``(T, P)``."""
+        at = by_vertex[self.vertex] if by_vertex.ndim == 1 else np.take_along_axis(by_vertex, self.vertex, axis=1)
+        return np.asarray(np.take_along_axis(at, self.partner, axis=1))
+
+    @cached_property
     def origin(self) -> FloatArray:
         """Where each measured point came from if the prediction is right ``(T, P, A)`` [unit].
 
@@ -71,7 +98,7 @@ class Held:
         if self.paired:
             return model
         out = np.full(measured.shape, np.nan)
-        lattice = surface_lattice(self.scenario, model)
+        lattice = surface_lattice(self.scenario, model) if self.marked else None
         for t, seen in enumerate(self.recording.series.valid):
             if not seen.any():
                 continue
@@ -104,3 +131,9 @@ class Held:
                 made = origin[t, seen] + noise[:, t, seen]
                 out[:, t, seen] = made - model[t, cKDTree(model[t]).query(made)[1]]
         return out
+
+
+def _nearest(vertices: FloatArray, points: FloatArray) -> IntArray:
+    """Of ``vertices (V, A)`` the nearest to each of ``points (Q, A)``; NaN are those behind the camera."""
+    there = np.flatnonzero(np.isfinite(vertices).all(axis=1))
+    return np.asarray(there[cKDTree(vertices[there]).query(points)[1]])

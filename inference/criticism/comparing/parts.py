@@ -3,7 +3,6 @@
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import cKDTree
 
 from ....core.arrays import FloatArray, IntArray
 from ....core.body import Body
@@ -19,13 +18,8 @@ _MARGIN = 0.12
 _SHARP = 0.7
 
 
-def point_places(scenario: Scenario) -> FloatArray:
-    """Where the predicted points are in the rest shape ``(Q, 3)`` [m]."""
-    return np.asarray(scenario.markers @ scenario.body.vertices)
-
-
 def distances(scenario: Scenario) -> FloatArray | None:
-    """How far every predicted point is from what is held, along the object ``(Q,)`` [m]; infinite where no way leads.
+    """How far every vertex is from what is held, along the object ``(V,)`` [m]; infinite where no way leads.
 
     None if nothing is held, or everything.
     """
@@ -33,11 +27,11 @@ def distances(scenario: Scenario) -> FloatArray | None:
     if not len(held):
         return None
     along = _along(scenario.body, held)
-    return along[_nearest_vertex(scenario)] if along[np.isfinite(along)].max() > 0 else None
+    return along if along[np.isfinite(along)].max() > 0 else None
 
 
 def distance_labels(scenario: Scenario) -> IntArray | None:
-    """Index into :data:`DISTANCES` of every predicted point ``(Q,)``, by thirds of the largest distance; or None."""
+    """Index into :data:`DISTANCES` of every vertex ``(V,)``, by thirds of the largest distance; or None."""
     along = distances(scenario)
     if along is None:
         return None
@@ -46,20 +40,15 @@ def distance_labels(scenario: Scenario) -> IntArray | None:
 
 
 def place_labels(scenario: Scenario) -> IntArray | None:
-    """Index into :data:`PLACES` of every predicted point ``(Q,)``; None if the object has one part only."""
+    """Index into :data:`PLACES` of every vertex ``(V,)``; None if the object has one part only."""
     body = scenario.body
     labels = _rope(body) if body.kind == "rope" else _sheet(body) if body.kind == "cloth" else _solid(body)
-    labels = labels[_nearest_vertex(scenario)]
     distance = distance_labels(scenario)
     if distance is not None:
         held = distance == 0
         labels = np.where(held & (labels == FREE_CORNER), HELD_CORNER, labels)
         labels = np.where(held & (labels == FREE_EDGE), HELD_EDGE, labels)
     return np.asarray(labels) if len(np.unique(labels)) > 1 else None
-
-
-def _nearest_vertex(scenario: Scenario) -> IntArray:
-    return np.asarray(cKDTree(scenario.body.vertices).query(point_places(scenario))[1])
 
 
 def _along(body: Body, sources: IntArray) -> FloatArray:

@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from ....core.arrays import FloatArray, IntArray
 from .groups import Partition
 from .held import Held
-from .parts import point_places
 from .sayings import where
 
 #: Successive frames that are averaged.
@@ -102,7 +101,8 @@ def _smooth(held: Held, frames: int, points: int) -> sparse.csr_array:
 
 
 def _neighbours(held: Held, points: int) -> sparse.csr_array:
-    places = point_places(held.scenario)
+    body = held.scenario.body
+    places = held.scenario.markers @ body.vertices if held.marked else body.vertices[held.usual_vertex]
     near = cKDTree(places).query(places, k=min(points, len(places)))[1].reshape(len(places), -1)
     rows = np.repeat(np.arange(len(places)), near.shape[1])
     return sparse.csr_array((np.ones(near.size), (rows, near.ravel())), shape=(len(places), len(places)))

@@ -40,7 +40,7 @@ def write_take(group: zarr.Group, held: Held, sets: SetView, motion: IntArray) -
         put(group, name, data, dims, its_unit)
     along = distances(held.scenario)
     if along is not None:
-        put(group, "distance_from_grasp", along, ["predicted_point"], "m", "along the object")
+        put(group, "distance_from_grasp", along[held.usual_vertex], ["predicted_point"], "m", "along the object")
     if len(held.draws):
         put(group, "draws", held.draws.astype(np.float32), ["draw", "time", "predicted_point", "axis"], unit)
     group.attrs.update(
