@@ -59,7 +59,7 @@ bench-inference: $(VENV)/.ready-bench
 bench-paper: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/paper.py $(PAPER)
 
-# trains over a dozen networks, for hours on two cores; PERCEPTION="--only heatmap --scenarios wiping --shifts" for one of them
+# an hour and a quarter on one core; PERCEPTION="--only heatmap --scenarios wiping --shifts" is a part of the first
 bench-perception: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/perception.py $(PERCEPTION)
 	$(BIN)/python tests/benchmarks/perception_study.py $(PERCEPTION_STUDY)

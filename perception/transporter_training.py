@@ -30,7 +30,7 @@ class Training:
         window: frames that the two of a pair lie apart at most; takes follow each other in the frames, and a pair near
             a seam may be of two takes.
         focus: how much more a pixel counts that differs between the two frames as much as pixels do on average; 0 as
-            published: each counts the same, and a rope of a hundredth of the picture is as good as not there.
+            published: each counts the same, and an object of a hundredth of the picture next to nothing.
         rate: of Adam at the beginning; it falls to a tenth.
         seed: of the weights and the pairs.
     """

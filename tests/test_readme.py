@@ -56,6 +56,15 @@ def test_the_table_of_posteriors_is_what_the_benchmark_wrote() -> None:
             assert cell == wanted
 
 
+def test_the_tables_of_perception_are_what_the_benchmark_wrote() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "tests/benchmarks/perception_table.py"], capture_output=True, text=True, check=True
+    )
+    printed = [line for line in done.stdout.splitlines() if line]
+    told = (ROOT / "docs/perception.md").read_text(encoding="utf-8").splitlines()
+    assert len(printed) > 20 and [line for line in told if line.startswith("|")] == printed
+
+
 @pytest.mark.parametrize("command", sorted(set(re.findall(r"muslin ([a-z]+(?:-[a-z]+)?) ", README)) & {
     "import", "new", "fit", "compare", "diagnose", "add", "report", "plugins", "check",
     "bench-material", "compare-simulators", "render", "calibrate", "export"}))  # fmt: skip

@@ -14,7 +14,7 @@ class Settings:
         held_out, held_out_draws: the same that are measured on, of other draws.
         epochs: of training ``heatmap`` at most.
         keypoints: of ``transporter``.
-        steps: of its training.
+        steps, focus: of its training.
         seed: of draws, looks, cameras and weights; held-out draws have this plus 1000.
     """
 
@@ -27,4 +27,5 @@ class Settings:
     epochs: int = 20
     keypoints: tuple[int, ...] = (4,)
     steps: int = 600
+    focus: float = 0.0
     seed: int = 0

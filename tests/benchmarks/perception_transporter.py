@@ -36,18 +36,16 @@ NEAR = 10.0
 #: The painted robot: half its width, and how far it reaches down over what it holds [px].
 HALF_WIDTH, REACH = 12, 6
 ROBOT_COLOUR = (40, 44, 60)
-#: Weight of what moves, of an object that is a hundredth of the picture.
-FOCUS = {"winding": 3.0}
 VARIANTS = ("no robot", "robot left out", "robot in the loss")
 #: What is measured, how it is told, and its unit.
 FIGURES = {
     "consistency": ("within 10 px of its own spot", "share of keypoints and frames"),
-    "grid_consistency": ("the same of a fixed grid", "share of points and frames"),
+    "grid_consistency": ("a fixed grid within 10 px of its own spots", "share of points and frames"),
     "on_object": ("on the object, of those given", "share"),
-    "grid_on_object": ("the same of a fixed grid", "share"),
+    "grid_on_object": ("a fixed grid on the object", "share"),
     "given": ("given", "share of keypoints and frames"),
     "chamfer_px": ("Chamfer to the object's pixels", "px of 320"),
-    "grid_chamfer_px": ("the same of a fixed grid", "px of 320"),
+    "grid_chamfer_px": ("Chamfer of a fixed grid", "px of 320"),
     "training_s": ("training", "s"),
     "frames_per_second": ("extraction", "frames/s"),
 }
@@ -134,7 +132,7 @@ def measure(
     setting: Setting, known: Seen, fresh: Seen, camera: Camera, variant: str, count: int, s: Settings
 ) -> dict[str, float]:
     """The numbers of :data:`FIGURES`."""
-    extractor = TransporterExtractor(keypoints=count, steps=s.steps, focus=FOCUS.get(setting.name, 0.0), seed=s.seed)
+    extractor = TransporterExtractor(keypoints=count, steps=s.steps, focus=s.focus, seed=s.seed)
     began = time.perf_counter()
     extractor.fit(known.frames(variant))
     training = time.perf_counter() - began
