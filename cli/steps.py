@@ -87,7 +87,8 @@ def diagnose(
         next_step(command("add", effects[0], study, "-o", output), *further, command("report", study))
     else:
         further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])
-        if verdict.get("unfinished"):
+        in_pixels = verdict.get("error", {}).get("unit") == "px"  # unknown needs metres
+        if verdict.get("unfinished") or (in_pixels and "unknown" in further):
             further = []
         next_step(*(command(step, study) for step in further), command("report", study))
 

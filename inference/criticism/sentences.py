@@ -190,6 +190,8 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
             "To be sure: a motion that excites them differently decides, faster, at another frequency, or held still; "
             f"muslin next {study.path} proposes one, and how sure you would be after it."
         )
+    if verdict == "none" and study.problem.recordings[study.problem.fit_on[0]].series.unit == "px":
+        return "To learn more: record points in metres; muslin unknown then estimates the missing force itself."
     if verdict == "none":
         return (
             f"To learn more: muslin unknown {study.path} estimates the missing force itself, shows it on the object, "
