@@ -129,12 +129,16 @@ def import_files(
     image: Annotated[
         str | None, typer.Option(metavar="NAME", help="LeRobot: which camera. Bag: which topic of images.")
     ] = None,
-    pose: Annotated[
+    depth_topic: Annotated[
         str | None,
+        typer.Option(metavar="NAME", help="Bag: topic of depth, aligned with the pictures (16UC1 in mm, 32FC1 in m)."),
+    ] = None,
+    pose: Annotated[
+        list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="LeRobot: the feature that holds the gripper's pose. Bag: its topic, /tf:FRAME for a transform. none: "
-            "no poses.",
+            help="LeRobot: the feature that holds the gripper's pose. Bag: its topic, /tf:FRAME for a transform; once "
+            "a gripper. none: no poses.",
         ),
     ] = None,
     pose_columns: Annotated[
@@ -169,7 +173,7 @@ def import_files(
     if output.exists() and not force:  # said before a long file is read
         raise InputError(f"{output} exists already; choose another name, or say --force to replace it")
     videos: dict[str, Any] = {"fps": fps, "size": size, "offset": offset, "depth": depth, "robot": robot}
-    videos |= {"image": image, "pose": pose, "pose-columns": pose_columns, "clock": clock}
+    videos |= {"image": image, "depth-topic": depth_topic, "pose": pose, "pose-columns": pose_columns, "clock": clock}
     each = {"start": start, "stop": stop, "motion": motion, "load": load, "gripper": gripper, "name": name}
     each["camera"] = camera
     seen = dataset is None and all_videos(files)

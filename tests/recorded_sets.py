@@ -127,6 +127,20 @@ def compressed(picture: np.ndarray, seconds: float) -> Any:
     return ROS.types["sensor_msgs/msg/CompressedImage"](stamp(seconds, "lens"), "png", data)
 
 
+def deep(metres: np.ndarray, seconds: float, encoding: str) -> Any:
+    """Depth ``(H, W)`` [m] as depth cameras send it; encoding ``"png"``: compressed."""
+    height, width = metres.shape
+    if encoding == "png":
+        header = np.zeros(12, np.uint8)  # of compressed_depth_image_transport
+        data = np.frombuffer(bytes(cv2.imencode(".png", np.round(1000 * metres).astype(np.uint16))[1]), np.uint8)
+        full = np.concatenate([header, data])
+        return ROS.types["sensor_msgs/msg/CompressedImage"](stamp(seconds), "16UC1; compressedDepth png", full)
+    raw = np.round(1000 * metres).astype("<u2") if encoding == "16UC1" else metres.astype("<f4")
+    rows = np.pad(raw.view(np.uint8).reshape(height, -1), [(0, 0), (0, 4)])
+    header = stamp(seconds, "lens")
+    return ROS.types["sensor_msgs/msg/Image"](header, height, width, encoding, 0, rows.shape[1], rows.reshape(-1))
+
+
 def pose(seconds: float, x: float) -> Any:
     place, turn = (ROS.types[f"geometry_msgs/msg/{name}"] for name in ("Point", "Quaternion"))
     made = ROS.types["geometry_msgs/msg/Pose"](place(x, 0.1, 0.3), turn(0.0, 0.0, 0.6, 0.8))  # x y z w

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from filmed import pictures, place
-from recorded_sets import NOW, compressed, image, pose, transforms, write_bag
+from filmed import HEIGHT, WIDTH, pictures, place
+from recorded_sets import NOW, compressed, deep, image, pose, transforms, write_bag
 
 from muslin.core.errors import InputError
 from muslin.core.frames import Video
@@ -64,11 +64,11 @@ def test_compressed_pictures_and_transforms(tmp_path: Path) -> None:
     path = write_bag(tmp_path / "take.mcap", {"/camera/png": images(compressed), "/tf": poses(transforms)})
     with pytest.raises(InputError, match="poses of elbow, gripper; say --pose /tf:FRAME"):
         one(path)
-    video, _ = one(path, pose="/tf:gripper")
+    video, _ = one(path, pose=("/tf:gripper",))
     np.testing.assert_array_equal(video.frames.rgb, FRAMES)
     assert video.gripper is not None
     np.testing.assert_allclose(video.gripper.at(video.time)[:, 0, 0], place(TIME), atol=1e-3)
-    assert one(path, pose="none")[0].gripper is None
+    assert one(path, pose=("none",))[0].gripper is None
 
 
 @pytest.mark.parametrize("encoding", ["bgr8", "mono8", "rgba8"])
@@ -88,15 +88,86 @@ def test_what_is_not_there_is_told_with_what_is(tmp_path: Path) -> None:
     for options, told in (
         ({}, "2 image topics; choose with --image one of /left, /right"),
         ({"image": "/top"}, r"no image topic '/top'.*/gripper \(geometry_msgs/msg/PoseStamped\)"),
-        ({"image": "/left", "pose": "/arm"}, "no pose topic '/arm'; choose with --pose one of /gripper"),
+        ({"image": "/left", "pose": ("/arm",)}, "no pose topic '/arm'; choose with --pose one of /gripper"),
     ):
         with pytest.raises(InputError, match=told):
             one(two, **options)
     with pytest.raises(InputError, match="no topic with images; it has /gripper"):
         one(write_bag(tmp_path / "blind.mcap", {"/gripper": poses()}))
-    deep = images(lambda picture, time: image(picture, time, "16UC1"))
-    with pytest.raises(InputError, match="encoding '16UC1'; pictures may have rgb8"):
-        one(write_bag(tmp_path / "deep.mcap", {"/depth": deep}))
+    far = images(lambda picture, time: image(picture, time, "16UC1"))
+    with pytest.raises(InputError, match=r"encoding '16UC1'; pictures may have rgb8.*--depth-topic"):
+        one(write_bag(tmp_path / "deep.mcap", {"/depth": far}))
+    with pytest.raises(InputError, match="encoding 'rgb8'; depth may have 16UC1"):
+        one(two, image="/left", depth_topic="/left", pose=("none",))
+    with pytest.raises(InputError, match=r"format 'png'; compressed depth must be 16UC1"):
+        one(two, image="/left", depth_topic="/right", pose=("none",))
+
+
+@pytest.mark.parametrize("encoding", ["16UC1", "32FC1", "png"])
+def test_depth_has_a_topic_and_a_clock_of_its_own(encoding: str, tmp_path: Path) -> None:
+    seen = 0.8 + 0.1 * TIME[:8]  # the last four frames have none
+
+    def depths() -> list[tuple[float, object]]:
+        made = []
+        for t, metres in zip(TIME, seen, strict=False):
+            layer = np.full((HEIGHT, WIDTH), metres)
+            layer[3, 5] = 0.0
+            made.append((NOW + t + 0.011 + DELAY, deep(layer, NOW + t + 0.011, encoding)))
+        return made
+
+    video, said = one(
+        write_bag(tmp_path / "take.mcap", {"/camera": images(), "/depth": depths}),
+        image="/camera",
+        depth_topic="/depth",
+    )
+    assert video.frames.depth is not None
+    np.testing.assert_allclose(video.frames.depth[:8, 0, 0], seen, atol=6e-4)
+    assert np.isnan(video.frames.depth[:8, 3, 5]).all()
+    # one and two frames after the last depth are 22 and 56 ms from it
+    np.testing.assert_allclose(video.frames.depth[8, 0, 0], seen[-1], atol=6e-4)
+    assert np.isnan(video.frames.depth[9:]).all() and "3 frames have no depth within 0.05 s" in said
+
+
+def test_depth_of_another_size_is_refused(tmp_path: Path) -> None:
+    small = lambda: [(NOW + t, deep(np.ones((4, 6)), NOW + t, "32FC1")) for t in TIME]  # noqa: E731
+    path = write_bag(tmp_path / "take.mcap", {"/camera": images(), "/depth": small})
+    with pytest.raises(InputError, match="depth topic has 6 x 4 pixels, but its frame has 64 x 48"):
+        one(path, depth_topic="/depth")
+    with pytest.raises(InputError, match="2 image topics; choose with --image one of /camera, /depth"):
+        one(path)
+
+
+def test_two_grippers_at_rates_of_their_own(tmp_path: Path) -> None:
+    slow = np.arange(4, 20) / 20.0
+
+    def other() -> list[tuple[float, object]]:
+        return [(NOW + t + 0.002, pose(NOW + t, 1.0 - 2.0 * t)) for t in slow]
+
+    bag = write_bag(tmp_path / "take.mcap", {"/camera": images(), "/left": poses(), "/right": other})
+    with pytest.raises(InputError, match="2 pose topics; choose with --pose one of /left, /right"):
+        one(bag)
+    for order in (("/left", "/right"), ("/right", "/left")):
+        video, said = one(bag, pose=order)
+        assert video.gripper is not None and video.gripper.grippers == 2
+        both = video.gripper.at(video.time)[:, :, 0]
+        wanted = {"/left": place(TIME), "/right": 1.0 - 2.0 * TIME}
+        np.testing.assert_allclose(both, np.stack([wanted[name] for name in order], axis=1), atol=1e-3)
+        assert "poses of /left" in said and "poses of /right" in said
+
+
+def test_two_transforms_of_one_topic(tmp_path: Path) -> None:
+    video, _ = one(
+        write_bag(tmp_path / "take.mcap", {"/camera": images(), "/tf": poses(transforms)}),
+        pose=("/tf:gripper", "/tf:elbow"),
+    )
+    assert video.gripper is not None and video.gripper.grippers == 2
+
+
+def test_grippers_that_share_no_time(tmp_path: Path) -> None:
+    late = lambda: [(NOW + t, pose(NOW + t, 0.0)) for t in (5.0, 6.0)]  # noqa: E731
+    path = write_bag(tmp_path / "take.mcap", {"/camera": images(), "/left": poses(), "/right": late})
+    with pytest.raises(InputError, match=r"share no time.*4\.110 s after"):
+        one(path, pose=("/left", "/right"))
 
 
 def test_a_bag_that_is_cut_off(tmp_path: Path) -> None:

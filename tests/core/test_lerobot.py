@@ -40,7 +40,7 @@ def test_columns_are_named_or_numbered(tmp_path: Path) -> None:
     assert video.gripper is not None and video.gripper.grippers == 2
     state = episode(0)[1]
     np.testing.assert_allclose(video.gripper.poses[:, 0, :3], state[:, [3, 1, 0]], atol=1e-6)
-    (bare,) = imported(path, takes=("episode_000000",), pose="none")
+    (bare,) = imported(path, takes=("episode_000000",), pose=("none",))
     assert bare.gripper is None
 
 
@@ -50,7 +50,8 @@ def test_columns_are_named_or_numbered(tmp_path: Path) -> None:
         ({}, "2 episodes, 0 to 1; choose with --take"),
         ({"takes": ("7",)}, "no episode '7'; it has 2 episodes, 0 to 1"),
         ({"takes": ("0",), "image": "wrist"}, f"no camera 'wrist'; choose with --image one of {CAMERA}"),
-        ({"takes": ("0",), "pose": "state"}, r"no feature 'state'.*observation.state \(joint_1, ee.x, ee.y, ee.z\)"),
+        ({"takes": ("0",), "pose": ("action", "observation.state")}, "--pose names one feature; give --pose-columns"),
+        ({"takes": ("0",), "pose": ("state",)}, r"no feature 'state'.*observation.state \(joint_1, ee.x, ee.y, ee.z\)"),
         ({"takes": ("0",), "pose_columns": ("ee.x,ee.y,tool",)}, "no entry 'tool'.*joint_1, ee.x"),
         ({"takes": ("0",), "pose_columns": ("1,2",)}, "must be 3"),
         ({"takes": ("0", "1"), "name": "a"}, "leave --name out"),

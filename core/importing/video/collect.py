@@ -1,5 +1,6 @@
 """Frames of a take, read one after the other, each put right before the next is read."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from . import pictures
 from .options import VideoOptions
 from .raw import RawVideo
 
+#: A depth picture this far from a frame in time is not of it [s].
+_APART = 0.05
 #: Most that the pictures of one take may need [bytes].
 MOST = 4 << 30
 
@@ -82,6 +85,7 @@ class _Kept:
         self._depth: list[DepthImage] = []
         self._robot: list[BoolArray] = []
         self._bytes = 0
+        self._deep = None if raw.depths is None else _Deep(raw.depths())
 
     def add(self, number: int, time: float, picture: Image) -> None:
         height, width = picture.shape[:2]
@@ -94,7 +98,10 @@ class _Kept:
         size = self._size or (width, height)
         layers: list[Image | DepthImage | BoolArray] = [picture]
         if file := self._file(self._raw.depth, number):
-            layers.append(_of_size(pictures.depth(file), file, width, height))
+            layers.append(_of_size(pictures.millimetres(file.read_bytes(), str(file)), file, width, height))
+            self._depth.append(self._right(layers[-1], size))
+        if self._deep is not None:
+            layers.append(_of_size(self._deep.at(time, height, width), "the depth topic", width, height))
             self._depth.append(self._right(layers[-1], size))
         if file := self._file(self._raw.robot, number):
             layers.append(_of_size(pictures.mask(file), file, width, height))
@@ -126,12 +133,35 @@ class _Kept:
         depth = np.stack(self._depth) if self._depth else None
         if depth is not None and (holes := float(np.isnan(depth).mean())):
             notes.append(f"{holes:.1%} of the depth are holes (NaN)")
+        if self._deep is not None and self._deep.missed:
+            notes.append(f"{self._deep.missed} frames have no depth within {_APART:g} s, so all of theirs are holes")
         robot = np.stack(self._robot) if self._robot else None
         return Collected(np.array(self.time), Frames(rgb, depth, robot, camera), tuple(notes))
 
 
+class _Deep:
+    """The depth picture that is nearest in time, asked for at rising times; both are read once."""
+
+    def __init__(self, pictures: Iterator[tuple[float, DepthImage]]) -> None:
+        self._rest = pictures
+        self._now = next(pictures, None)
+        self._next = next(pictures, None)
+        self.missed = 0
+
+    def at(self, time: float, height: int, width: int) -> DepthImage:
+        """Depth ``(H, W)`` [m] at a time [s]; all holes where none is near."""
+        while (
+            self._now is not None and self._next is not None and abs(self._next[0] - time) <= abs(self._now[0] - time)
+        ):
+            self._now, self._next = self._next, next(self._rest, None)
+        if self._now is not None and abs(self._now[0] - time) <= _APART:
+            return self._now[1]
+        self.missed += 1
+        return np.full((height, width), np.nan, np.float32)
+
+
 def _of_size(
-    layer: "np.ndarray[tuple[int, ...]]", file: Path, width: int, height: int
+    layer: "np.ndarray[tuple[int, ...]]", file: Path | str, width: int, height: int
 ) -> "np.ndarray[tuple[int, ...]]":
     if layer.shape != (height, width):
         raise InputError(

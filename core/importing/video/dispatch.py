@@ -71,9 +71,14 @@ def _check(path: Path, options: VideoOptions) -> None:
         raise InputError(f"--fps must be 0.1 to 10000 frames a second, but is {options.fps:g}")
     if options.size is not None and not all(1 <= n <= 8192 for n in options.size):
         raise InputError(f"--size must be 1 to 8192 pixels a side, but is {options.size[0]} x {options.size[1]}")
+    if options.depth_topic is not None and options.depth is not None:
+        raise InputError("give --depth or --depth-topic, not both")
+    if is_lerobot(path) and options.depth_topic is not None:
+        raise InputError(f"--depth-topic goes with a bag, which {path} is not")
     if not (is_lerobot(path) or is_bag(path)):
         own = {"--image": options.image, "--pose": options.pose, "--pose-columns": options.pose_columns}
-        if wrong := [name for name, value in (own | {"--take": options.takes}).items() if value]:
+        own |= {"--take": options.takes, "--depth-topic": options.depth_topic}
+        if wrong := [name for name, value in own.items() if value]:
             raise InputError(f"{wrong[0]} goes with a LeRobot data set or a bag, which {path} is not")
 
 

@@ -24,24 +24,29 @@ def gripper_of(
     Raises:
         InputError: nothing tells which entries they are; the message lists those that there are.
     """
-    if options.pose == "none":
+    if options.pose == ("none",):
         return None, ()
+    if len(options.pose) > 1:
+        raise InputError(
+            f"{files.path}: of a LeRobot data set --pose names one feature; give --pose-columns once a gripper"
+        )
+    wanted = options.pose[0] if options.pose else None
     known = {key: _entries(f) for key, f in files.features.items() if key in table and _is_vector(f)}
-    if options.pose is not None and options.pose not in known:
-        raise InputError(f"{files.path} has no feature {options.pose!r} of numbers; it has {_listed(known)}")
+    if wanted is not None and wanted not in known:
+        raise InputError(f"{files.path} has no feature {wanted!r} of numbers; it has {_listed(known)}")
     if options.pose_columns:
-        feature = options.pose or next((k for k in _USUAL if k in known), "")
+        feature = wanted or next((k for k in _USUAL if k in known), "")
         if not feature:
             raise InputError(f"{files.path}: say with --pose in which feature the pose is: {_listed(known)}")
         chosen = [_chosen(text, feature, known[feature], files) for text in options.pose_columns]
     else:
-        order = [options.pose] if options.pose else [*(k for k in _USUAL if k in known), *known]
+        order = [wanted] if wanted else [*(k for k in _USUAL if k in known), *known]
         guessed = next(((k, c) for k in order if (c := _guessed(known[k]))), None)
         if guessed is None:
             raise InputError(
                 f"{files.path}: nothing is named x, y and z, so say where the gripper's pose is with --pose FEATURE "
                 "--pose-columns X,Y,Z[,QW,QX,QY,QZ] (names, or numbers from 0), or --pose none for no poses; there is "
-                f"{_listed({options.pose: known[options.pose]} if options.pose else known)}"
+                f"{_listed({wanted: known[wanted]} if wanted else known)}"
             )
         feature, chosen = guessed[0], [guessed[1]]
     values = np.asarray(table[feature], float).reshape(len(table["timestamp"]), -1)

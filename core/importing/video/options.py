@@ -21,7 +21,9 @@ class VideoOptions(ImportOptions):
         depth: folder of 16-bit pictures in millimetres, 0 where there is none, one a frame.
         robot: folder of masks that are not zero where the robot is, one a frame.
         image: camera of a LeRobot data set, or image topic of a bag; None: the only one.
-        pose: feature of a LeRobot data set, or pose topic of a bag, of the gripper's pose; ``"none"``: no poses.
+        depth_topic: topic of a bag with depth that is aligned with its pictures.
+        pose: feature of a LeRobot data set, or pose topics of a bag, one a gripper; empty: the only one there is;
+            ``("none",)``: no poses.
         pose_columns: for each gripper, the entries of that feature that are x, y, z and optionally qw, qx, qy, qz.
         takes: episodes of a LeRobot data set; none: all.
         clock: of a bag.
@@ -33,7 +35,8 @@ class VideoOptions(ImportOptions):
     depth: Path | None = None
     robot: Path | None = None
     image: str | None = None
-    pose: str | None = None
+    depth_topic: str | None = None
+    pose: tuple[str, ...] = ()
     pose_columns: tuple[str, ...] = ()
     takes: tuple[str, ...] = ()
     clock: Clock = "header"

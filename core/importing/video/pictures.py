@@ -33,17 +33,17 @@ def colour(data: bytes, where: str) -> Image:
     return np.ascontiguousarray(read[..., ::-1])
 
 
-def depth(path: Path) -> DepthImage:
-    """Depth ``(H, W)`` [m] of a 16-bit greyscale file in millimetres; NaN where it has 0, a hole.
+def millimetres(data: bytes, where: str) -> DepthImage:
+    """Depth ``(H, W)`` [m] of the bytes of a 16-bit greyscale file in millimetres; NaN where it has 0, a hole.
 
     Raises:
         InputError: it is no such picture.
     """
-    read = _decoded(path.read_bytes(), opencv().IMREAD_UNCHANGED, str(path))
+    read = _decoded(data, opencv().IMREAD_UNCHANGED, where)
     if read.dtype != np.uint16 or read.ndim != 2:
         channels = 1 if read.ndim == 2 else read.shape[2]
         raise InputError(
-            f"{path}: depth must be greyscale of 16 bits in millimetres, but it has {channels} channel(s) of "
+            f"{where}: depth must be greyscale of 16 bits in millimetres, but it has {channels} channel(s) of "
             f"{8 * read.dtype.itemsize} bits"
         )
     return np.where(read > 0, read.astype(np.float32) / np.float32(1000.0), np.float32(np.nan))

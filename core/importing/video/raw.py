@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...lens import Lens
-from ...picture import Image
+from ...picture import DepthImage, Image
 from ..raw import RawGripper
 
 
@@ -18,6 +18,7 @@ class RawVideo:
         name: that it has by itself.
         frames: gives time [s] and picture ``(H, W, 3)`` of every frame.
         depth, robot: files of these layers, one a frame; empty where there are none.
+        depths: gives time [s] and depth ``(H, W)`` [m] of every picture of a depth camera with times of its own.
         gripper: poses that the file holds, on the clock of the frames.
         lens: that the file names.
         origin: what the clock of the file says where time is 0 [s].
@@ -29,6 +30,7 @@ class RawVideo:
     frames: Callable[[], Iterator[tuple[float, Image]]]
     depth: tuple[Path, ...] = ()
     robot: tuple[Path, ...] = ()
+    depths: Callable[[], Iterator[tuple[float, DepthImage]]] | None = None
     gripper: RawGripper | None = None
     lens: Lens | None = None
     origin: float = 0.0
