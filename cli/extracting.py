@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from ..core.annotated_frames import annotated_frames
@@ -26,6 +27,9 @@ from .output import check_output
 from .recordings import summary
 
 _OPTION = "An option of the extractor; once each. Numbers, true, false and [lists] are taken as such."
+
+#: A point that is seen in a smaller share of the frames than this is told.
+_RARE = 0.1
 
 
 def add_to(app: typer.Typer) -> None:
@@ -70,6 +74,8 @@ def extract(
     say(f"wrote {output}: {count} frames by {extractor!r} at {count / seconds:.1f} a second")
     for recording in made:
         say("  " + summary(recording))
+        if rare := _rare(recording):
+            say(f"    seen in less than a tenth of the frames: {rare}; look at the frames, or train with more of them")
     if any(r.series.unit == "px" and r.camera is None for r in made):
         say("  no camera is known, which comparing pixels needs; import the video with --camera FILE")
     next_step(
@@ -105,6 +111,13 @@ def train(
     what = "annotated frames" if annotations else "frames"
     say(f"wrote {output}: {extractor!r}, trained on {len(frames)} {what} in {time.perf_counter() - began:.0f} s")
     next_step(command("extract", video, "--extractor", extractor, "--weights", output, "-o", "POINTS.zarr"))
+
+
+def _rare(recording: Recording) -> str:
+    """Numbers of the points that hardly a frame shows, of an extractor whose points keep their order."""
+    share = recording.series.valid.mean(axis=0)
+    few = [str(k) for k in np.flatnonzero(share < _RARE)] if recording.series.correspondence else []
+    return f"point{'s' if len(few) > 1 else ''} {', '.join(few)}" if few else ""
 
 
 def _annotated(video: Path, path: Path) -> tuple[Frames, FloatArray]:

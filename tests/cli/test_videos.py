@@ -105,6 +105,16 @@ def test_from_a_video_to_a_measurement(call: Any, take: Path, tmp_path: Path) ->
     np.testing.assert_allclose(recording.series.points[:, 0, 0], np.round(8 + 400 * place(TIME)) + 5.5, atol=0.7)
 
 
+def test_a_point_that_hardly_a_frame_shows_is_told(call: Any, tmp_path: Path) -> None:
+    frames = pictures(TIME[:40])
+    grey = [np.full_like(frames[0], 90) for _ in frames]
+    for count, told in ((3, True), (4, False)):
+        write_video(tmp_path / f"{count}.mp4", frames[:count] + grey[count:], TIME[:40])
+        assert call("import", f"{count}.mp4", "-o", f"{count}.zarr").status == 0
+        done = call("extract", f"{count}.zarr", "--extractor", "reddest", "-o", f"{count}-points.zarr")
+        assert done.status == 0 and ("seen in less than a tenth of the frames: point 0" in done.out) == told, done.out
+
+
 def test_training_from_annotated_frames(call: Any, take: Path, tmp_path: Path) -> None:
     assert call("import", "take.mp4", "-o", "take.zarr").status == 0
     names = [{"id": k, "file_name": f"take/{k}", "width": WIDTH, "height": HEIGHT} for k in (0, 20)]
