@@ -38,7 +38,8 @@ def main() -> None:
     parser.add_argument("--shifts", nargs="*", default=default.shifts, help="measured across engines; of the scenarios")
     for name in ("frames", "draws", "held_out", "held_out_draws", "epochs", "steps", "seed"):
         parser.add_argument(f"--{name.replace('_', '-')}", type=int, default=getattr(default, name))
-    parser.add_argument("--focus", type=float, default=default.focus, help="of transporter")
+    parser.add_argument("--focused", nargs="*", default=default.focused, help="scenarios where focus is measured, too")
+    parser.add_argument("--focus", type=float, default=default.focus, help="of transporter, there")
     given = vars(parser.parse_args())
     only = given.pop("only")
     settings = Settings(**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})

@@ -14,7 +14,8 @@ class Settings:
         held_out, held_out_draws: the same that are measured on, of other draws.
         epochs: of training ``heatmap`` at most.
         keypoints: of ``transporter``.
-        steps, focus: of its training.
+        steps: of its training.
+        focused, focus: scenarios in which it is also trained with its option ``focus``, and that value.
         seed: of draws, looks, cameras and weights; held-out draws have this plus 1000.
     """
 
@@ -25,7 +26,8 @@ class Settings:
     held_out: int = 60
     held_out_draws: int = 4
     epochs: int = 20
-    keypoints: tuple[int, ...] = (4,)
+    keypoints: tuple[int, ...] = (4, 8)
     steps: int = 600
-    focus: float = 0.0
+    focused: tuple[str, ...] = ("winding",)
+    focus: float = 3.0
     seed: int = 0

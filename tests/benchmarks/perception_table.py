@@ -42,13 +42,16 @@ def heatmap() -> list[str]:
 
 def transporter() -> list[str]:
     """What ``transporter`` finds, with and without a robot, beside a fixed grid."""
-    lines = ["| scenario | robot | at its own spot (grid) | on the object (grid) | given | Chamfer (grid) [px] |"]
-    lines.append("|---" * 6 + "|")
-    for match, found in _groups(_rows("perception"), r"transporter (\w+), \d+ keypoints, (.*)"):
+    lines = [
+        "| scenario | K | focus | robot | at its own spot (grid) | on the object (grid) | given | Chamfer (grid) [px] |"
+    ]
+    lines.append("|---" * 8 + "|")
+    pattern = r"transporter (\w+), (\d+) keypoints(?:, focus ([\d.]+))?, (no robot|robot .*)"
+    for match, found in _groups(_rows("perception"), pattern):
         near = found["Chamfer to the object's pixels"]
         share = {k: f"{100 * v:.0f} %" for k, v in found.items()}
         lines.append(
-            f"| `{match[1]}` | {match[2]} "
+            f"| `{match[1]}` | {match[2]} | {match[3] or 0} | {match[4]} "
             f"| {share['within 10 px of its own spot']} ({share['a fixed grid within 10 px of its own spots']}) "
             f"| {share['on the object, of those given']} ({share['a fixed grid on the object']}) | {share['given']} "
             f"| {near:.1f} ({found['Chamfer of a fixed grid']:.1f}) |"
