@@ -11,7 +11,7 @@ from ..core.measurement import Measurement
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
-_CHOICES = ("all", "bound", "nearest")
+_CHOICES = ("all", "bound", "surface", "nearest")
 #: A point further than this share of the object's size from the mesh is probably in another frame.
 _FAR = 0.25
 
@@ -47,6 +47,8 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body) ->
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
+    if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
+        return replace(plan, markers="surface"), [f"the {count} points are a cloud, held against the whole surface"]
     if plan.markers is None and (not followed or count == len(body.vertices)):
         return replace(plan, markers="all"), []
     if plan.markers is None and body.kind == "solid":

@@ -74,9 +74,10 @@ def new(
     markers: Annotated[
         str,
         typer.Option(
-            metavar="all|bound|nearest|I,J",
+            metavar="all|bound|surface|nearest|I,J",
             help="Where the points sit on the mesh: on every vertex in order, tied rigidly to where they are in the "
-            "first frame, on the vertex nearest to that, or on these vertices; default what fits.",
+            "first frame, anywhere on the surface (clouds), on the vertex nearest to the first frame, or on these "
+            "vertices; default what fits.",
         ),
     ] = "",
     force: Annotated[bool, typer.Option("--force", help="Replace a study file that is there already.")] = False,

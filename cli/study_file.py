@@ -109,7 +109,7 @@ def _scenario(plan: Plan) -> str:
             '# gripper along the axes of the world) or "world" (as it stands at the start).',
             '# frame = "gripper"',
             '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
-            "# first frame), or a vertex number for each.",
+            '# first frame), "surface" (anywhere: clouds), or a vertex number for each.',
             f"markers = {_value(plan.markers)}",
             f"{points}  # measured points to compare, from 0; default all",
             *_grasps(plan),

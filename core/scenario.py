@@ -66,6 +66,7 @@ class Scenario:
         start_motion: how a rope moves as it starts, which then is given no time to settle; None: it is at rest.
         camera: that looks at it, or None where it is not known.
         unit: of what is measured: "px" of that camera, or "m" in the world.
+        sampled: the markers are places spread over the object, not spots that are marked on it.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Scenario:
     start_motion: StartMotion | None = None
     camera: Camera | None = None
     unit: PointUnit = "m"
+    sampled: bool = False
 
     def __post_init__(self) -> None:
         count = len(self.body.vertices)

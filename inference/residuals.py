@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..core.arrays import FloatArray
 from ..core.interpolation import interpolate
@@ -10,6 +11,8 @@ from ..core.measurement import Recording
 from ..core.series import PointSeries
 from .noise import Noise
 
+#: Gauss-Newton steps that find the offsets: where points correspond, and at most where each looks for its nearest.
+_STEPS, _CLOSEST_STEPS = 4, 12
 #: What a failed rollout counts as, in every residual [noise standard deviations].
 FAILED = 100.0
 
@@ -63,23 +66,30 @@ def _rms(difference: FloatArray, axes: tuple[int, ...]) -> FloatArray:
 def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets: Offsets) -> Residual:
     """Compare, after the offsets most probable under their priors are taken out.
 
-    Without correspondence each measured point is held against the nearest predicted one.
+    Without correspondence each measured point is held against the nearest predicted one, which is looked for anew as
+    the offsets become known (as iterative closest points do, Besl and McKay 1992).
     """
-    measured = recording.series.points
-    model = predicted.points
-    if not recording.series.correspondence:
-        model = _nearest(measured, model)
+    measured, time = recording.series.points, recording.series.time
+    paired = recording.series.correspondence
     if offsets.clock == 0.0 and offsets.constant == 0.0:
-        difference = measured - model
+        difference = measured - (predicted.points if paired else _nearest(measured, predicted.points)[0])
         return Residual(difference, _weighted(difference, noise))
     clock, constant = 0.0, np.zeros(measured.shape[2])
-    time = recording.series.time
-    for _ in range(4):
-        shifted = interpolate(time + clock, time, model)
+    least, best = np.inf, (clock, constant, measured)
+    for _ in range(1 + (_STEPS if paired else _CLOSEST_STEPS)):
+        shifted = interpolate(time + clock, time, predicted.points)
         slope = np.gradient(shifted, time, axis=0)
-        clock_step, constant = _solve(measured - shifted, slope, clock, noise, offsets)
-        clock = float(np.clip(clock + clock_step, -4 * offsets.clock, 4 * offsets.clock))
-    difference = measured - interpolate(time + clock, time, model) - constant
+        if not paired:
+            shifted, slope = _nearest(measured - constant, shifted, slope)
+        difference = measured - shifted - constant
+        cost = _cost(difference, clock, constant, noise, offsets)
+        if cost < least:
+            least, best = cost, (clock, constant, difference)
+        elif not paired:  # as near as the places let it come
+            break
+        step = _solve(*_rows(difference, slope, constant, paired), clock, noise, offsets)
+        clock, constant = float(np.clip(clock + step[0], -4 * offsets.clock, 4 * offsets.clock)), step[1:]
+    clock, constant, difference = best
     parts = [_weighted(difference, noise)]
     if offsets.clock > 0:
         parts.append(np.array([clock / offsets.clock]))
@@ -102,34 +112,57 @@ def by_residual(recording: Recording, offsets: Offsets, by_frame: FloatArray) ->
     return np.concatenate([seen, np.zeros(len(failed(recording, offsets)) - len(seen))])
 
 
-def _solve(
-    difference: FloatArray, slope: FloatArray, clock: float, noise: Noise, offsets: Offsets
-) -> tuple[float, FloatArray]:
-    """One Gauss-Newton step for the clock and the constant offset, with Gaussian priors of mean zero."""
+def _cost(difference: FloatArray, clock: float, constant: FloatArray, noise: Noise, offsets: Offsets) -> float:
+    """Minus twice the log posterior of the offsets."""
+    total = noise.information / noise.sd**2 * float(np.nansum(difference**2))
+    total += (clock / offsets.clock) ** 2 if offsets.clock > 0 else 0.0
+    return total + (float(np.sum(constant**2)) / offsets.constant**2 if offsets.constant > 0 else 0.0)
+
+
+def _rows(
+    difference: FloatArray, slope: FloatArray, constant: FloatArray, paired: bool
+) -> tuple[FloatArray, FloatArray]:
+    """What is seen of measured minus predicted ``(N,)``, and its derivatives by clock and constant ``(N, 1 + A)``.
+
+    Where points correspond, of every coordinate. Where each is held against its nearest, of their distance: along the
+    surface the nearest one follows, so only the way off it counts (as from point to plane, Chen and Medioni 1992).
+    """
     axes = difference.shape[2]
     seen = np.isfinite(difference)
-    d = np.where(seen, difference, 0.0)
-    s = np.where(seen, slope, 0.0)
+    if paired:
+        design = np.concatenate([slope[..., None], np.broadcast_to(np.eye(axes), (*slope.shape, axes))], axis=3)
+        return (difference + constant)[seen], design[seen]
+    there = seen.all(axis=2)
+    away = difference[there]
+    distance = np.linalg.norm(away, axis=1)
+    ray = away / np.where(distance > 0, distance, 1.0)[:, None]
+    by_clock = np.sum(ray * slope[there], axis=1)
+    return distance + ray @ constant, np.concatenate([by_clock[:, None], ray], axis=1)
+
+
+def _solve(right: FloatArray, design: FloatArray, clock: float, noise: Noise, offsets: Offsets) -> FloatArray:
+    """One Gauss-Newton step ``(1 + A,)`` of the clock, and the constant, with Gaussian priors of mean zero."""
     weight = noise.information / noise.sd**2
-    normal = np.zeros((1 + axes, 1 + axes))
-    right = np.zeros(1 + axes)
-    normal[0, 0] = weight * np.sum(s * s) + (1 / offsets.clock**2 if offsets.clock > 0 else 1e30)
-    right[0] = weight * np.sum(s * d) - (clock / offsets.clock**2 if offsets.clock > 0 else 0.0)
-    for a in range(axes):
-        normal[0, 1 + a] = normal[1 + a, 0] = weight * np.sum(s[..., a])
-        normal[1 + a, 1 + a] = weight * np.sum(seen[..., a]) + (
-            1 / offsets.constant**2 if offsets.constant > 0 else 1e30
-        )
-        right[1 + a] = weight * np.sum(d[..., a])
-    solved = np.linalg.solve(normal, right)
-    return float(solved[0]), solved[1:]
+    prior = np.full(design.shape[1], 1 / offsets.constant**2 if offsets.constant > 0 else 1e30)
+    prior[0] = 1 / offsets.clock**2 if offsets.clock > 0 else 1e30
+    pull = weight * design.T @ right
+    pull[0] -= clock * prior[0] if offsets.clock > 0 else 0.0
+    return np.asarray(np.linalg.solve(weight * design.T @ design + np.diag(prior), pull))
 
 
-def _nearest(measured: FloatArray, model: FloatArray) -> FloatArray:
-    out = np.full_like(measured, np.nan)
-    for t in range(len(measured)):
-        gaps = np.linalg.norm(measured[t, :, None] - model[t, None], axis=-1)
-        out[t] = model[t, np.argmin(np.where(np.isfinite(gaps), gaps, np.inf), axis=1)]
+def _nearest(measured: FloatArray, model: FloatArray, *more: FloatArray) -> list[FloatArray]:
+    """Of ``model (T, Q, A)`` the point nearest to each of ``measured (T, P, A)``, and what ``more`` says of it.
+
+    Returns:
+        ``(T, P, A)`` for ``model`` and each of ``more``; NaN where one of both points was not seen.
+    """
+    out = [np.full_like(measured, np.nan) for _ in range(1 + len(more))]
+    for t, (points, predicted) in enumerate(zip(measured, model, strict=True)):
+        seen, there = np.isfinite(points).all(axis=1), np.isfinite(predicted).all(axis=1)
+        if seen.any() and there.any():
+            near = np.flatnonzero(there)[cKDTree(predicted[there]).query(points[seen])[1]]
+            for made, source in zip(out, (model, *more), strict=True):
+                made[t, seen] = source[t, near]
     return out
 
 

@@ -12,11 +12,12 @@ from ..core.extractor import KeypointExtractor
 from ..core.frames import Frames
 from ..core.series import PointSeries
 from ..core.simulated_take import SimulatedTake
+from ..core.subsets import stacked, thinned
 from ..core.surface import object_surface
+from ..core.surface_samples import spread_over
 from ..core.visibility import visible
 from .color_mask import TOLERANCE, colour_range, no_object
 from .colour import object_mask
-from .subsets import even_subset, stacked
 
 #: Candidates on a simulated surface for every point that is wanted.
 _CANDIDATES = 4
@@ -91,7 +92,7 @@ class CloudExtractor(KeypointExtractor):
             places = eye + depth[mask].astype(float)[:, None] * rays[mask]
             if self.box is not None:
                 places = places[((places >= self.box[0]) & (places <= self.box[1])).all(axis=1)]
-            found.append(self._thinned(places))
+            found.append(thinned(places, self.voxel, self.points))
         if not any(map(len, found)):
             where = "" if self.box is None else f" in the box from {self.box[0].tolist()} to {self.box[1].tolist()} m"
             raise InputError(f"no pixel of the object has depth{where}; check the depth images, the camera and the box")
@@ -110,7 +111,7 @@ class CloudExtractor(KeypointExtractor):
             )
         samples, facing = self._samples(take, take.camera.pose[:3])
         seen = visible(take.scene, take.camera, take.vertices, samples) & facing
-        found = [self._thinned(places[row]) for places, row in zip(samples, seen, strict=True)]
+        found = [thinned(places[row], self.voxel, self.points) for places, row in zip(samples, seen, strict=True)]
         if not any(map(len, found)):
             raise RolloutFailed("the object is out of view: the camera sees no point of it in any frame")
         return PointSeries(take.series.time, stacked(found, self.points), correspondence=False)
@@ -126,11 +127,7 @@ class CloudExtractor(KeypointExtractor):
         if take.scene.body.kind == "cloth":  # its two sides are one and the same
             triangles, count = triangles[: len(triangles) // 2], count // 2
         rest = surface.place(take.scene.body.vertices)[triangles]
-        area = np.linalg.norm(np.cross(rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]), axis=1)
-        which = np.searchsorted(np.cumsum(area) / area.sum(), (np.arange(count) + 0.5) / count)
-        # places within the triangles by a low-discrepancy sequence (Roberts 2018), folded into the triangle
-        a, b = (0.5 + np.arange(count)[:, None] * [0.7548776662466927, 0.5698402909980532]).T % 1.0
-        a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
+        which, a, b = spread_over(rest, count)
         samples, facing = [], []
         for vertices in take.vertices:
             corners = surface.place(vertices)[triangles[which]]
@@ -142,15 +139,6 @@ class CloudExtractor(KeypointExtractor):
             samples.append(spots)
             facing.append((np.abs(slant) if take.scene.body.kind == "cloth" else slant) > _GRAZING)
         return np.stack(samples), np.stack(facing)
-
-    def _thinned(self, places: FloatArray) -> FloatArray:
-        """One of ``places (N, 3)`` in every voxel, the first of them, and of these as many as are wanted."""
-        if not len(places):
-            return places
-        cells = np.floor(places / self.voxel).astype(np.int64)
-        cells -= cells.min(axis=0)
-        _, first = np.unique(cells, axis=0, return_index=True)
-        return places[first[even_subset(cells[first], self.points)]]
 
 
 def _checked(box: Sequence[Sequence[float]]) -> FloatArray:

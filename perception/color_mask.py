@@ -13,8 +13,8 @@ from ..core.frames import Frames
 from ..core.picture import Appearance, texture_of
 from ..core.series import PointSeries
 from ..core.simulated_take import SimulatedTake
+from ..core.subsets import even_subset, outermost, stacked
 from .colour import ColourRange, object_mask, told
-from .subsets import even_subset, outermost, stacked
 
 #: The colour in which muslin's renderers paint an object.
 _PAINTED = texture_of(Appearance().object)[0, 0].tolist()

@@ -17,8 +17,11 @@ from ..scenarios import preset
 from ..scenarios.grasps import ASK, grasps_at
 from ..scenarios.measured import measured_start
 from ..scenarios.starts import GivenShape
+from ..surface_samples import surface_weights
 from .scenario_table import ScenarioTable
 
+#: Places on the object that stand for the points of a cloud.
+SURFACE_SAMPLES = 1000
 #: An edge that is longer at the start than this times its rest length cannot be meant.
 _LARGEST_START_STRETCH = 1.05
 
@@ -83,7 +86,9 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path, mar
     check_comparable(recording)
     if table.start == "measured":
         return measured_start(plain, recording)
-    return replace(plain, markers=_markers(table.markers, plain, recording)) if marked else plain
+    if not marked:
+        return plain
+    return replace(plain, markers=_markers(table.markers, plain, recording), sampled=table.markers == "surface")
 
 
 def _in_gripper_frame(body: Body, frame: str, motion: Motion, start: float) -> Body:
@@ -137,6 +142,13 @@ def check_unstretched(scenario: Scenario, scale: float, where: str) -> None:
 
 def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Recording) -> FloatArray:
     count, points = len(scenario.body.vertices), recording.series.points
+    if choice == "surface":
+        if recording.series.correspondence:
+            raise InputError(
+                "[scenario] markers = 'surface' is for clouds, whose points are anywhere on the object, but recording "
+                f"{recording.name!r} follows its points; say 'all', 'bound' or a vertex for each"
+            )
+        return surface_weights(scenario.body, SURFACE_SAMPLES)
     if choice == "bound":
         check_spatial(recording)
         if scenario.settle > 0:

@@ -87,7 +87,7 @@ class ScenarioTable(StrictTable):
     grasp_points: list[Point | list[Point]] | None = None
     grasp_radius: float = Field(default=0.0, ge=0)
     start: Literal["measured"] | None = None
-    markers: list[int] | Literal["all", "bound"] | None = None
+    markers: list[int] | Literal["all", "bound", "surface"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
     obstacles: list[ObstacleTable] | None = None

@@ -3,12 +3,22 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from ...core.arrays import BoolArray, FloatArray
 from ...core.dataset import about, archives, arrays, chosen, note, shaped
 from ...core.errors import InputError
 from ...core.measurement import Recording
 from ...core.motion import Motion
 from ...core.series import PointSeries
+from ...core.subsets import stacked, thinned
 
+#: A point counts as one of the sheet if so many share its neighbourhood of three cells a side [m].
+CROWD, CELL = 12, 0.01
+#: Points farther than this from nearly all others are not looked at [m].
+REACH = 0.5
+#: Points that are kept of a frame, one in every voxel of this side [m].
+KEPT, VOXEL = 600, 0.005
 #: Frames at the start in which the clouds hold arm and gripper rather than cloth.
 SKIPPED = 5
 
@@ -16,7 +26,8 @@ SKIPPED = 5
 def read_cloth_cloud(path: Path, takes: Sequence[str]) -> list[Recording]:
     """Takes from a folder of NPZ files, or one: ``points (T, P, 3)``, ``gripper_cmd (T, 3)`` [m], ``t (T,)`` [s].
 
-    Clouds have no correspondence; they are cut off near the table and hold outliers. The gripper is the command, which
+    Clouds have no correspondence; they are cut off near the table. Points that stand nearly alone are left out, and of
+    the others at most 600 a frame kept, evenly. The gripper is the command, which
     the cloth's apex trails by 2 to 3 cm; its poses go from the first frame, the points from the sixth. Takes whose
     names differ in a trailing 2 alone are repeats.
 
@@ -32,6 +43,22 @@ def read_cloth_cloud(path: Path, takes: Sequence[str]) -> list[Recording]:
     return made
 
 
+def among_many(points: FloatArray) -> BoolArray:
+    """Which of ``points (N, 3)`` [m] have :data:`CROWD` points, themselves included, in their cell and those around."""
+    out = np.zeros(len(points), bool)
+    if not len(points):
+        return out
+    low, high = np.quantile(points, (0.01, 0.99), axis=0)
+    near = np.flatnonzero(((points > low - REACH) & (points < high + REACH)).all(axis=1))
+    cells = np.floor(points[near] / CELL).astype(np.int64)
+    cells -= cells.min(axis=0) - 1
+    counts = np.zeros(cells.max(axis=0) + 2, np.int64)
+    np.add.at(counts, tuple(cells.T), 1)
+    steps = np.array(list(np.ndindex(3, 3, 3))) - 1
+    out[near] = np.sum([counts[tuple((cells + step).T)] for step in steps], axis=0) >= CROWD
+    return out
+
+
 def _recording(path: Path, name: str) -> Recording:
     data = arrays(path, ("points", "gripper_cmd", "t"))
     points = shaped(data["points"], (None, None, 3), "points", path)
@@ -39,6 +66,16 @@ def _recording(path: Path, name: str) -> Recording:
     time = shaped(data["t"], (len(points),), "t", path)
     if len(points) < SKIPPED + 2:
         raise InputError(f"{path}: {len(points)} frames are too few; the first {SKIPPED} are left out")
-    note(f"{name}: left out the first {SKIPPED} frames, which show arm and gripper")
-    series = PointSeries(time[SKIPPED:], points[SKIPPED:], correspondence=False)
+    frames = [frame[np.isfinite(frame).all(axis=1)] for frame in points[SKIPPED:]]
+    crowded = [frame[among_many(frame)] for frame in frames]
+    if not all(map(len, crowded)):
+        k = SKIPPED + [len(frame) > 0 for frame in crowded].index(False)
+        raise InputError(f"{path}: frame {k} shows no sheet: no {CROWD} of its points lie together")
+    alone = sum(map(len, frames)) - sum(map(len, crowded))
+    kept = stacked([thinned(frame, VOXEL, KEPT) for frame in crowded], KEPT)
+    note(
+        f"{name}: left out the first {SKIPPED} frames, which show arm and gripper, and {alone} points that stand "
+        f"alone; kept {np.isfinite(kept[..., 0]).sum(axis=1).mean():.0f} of {points.shape[1]} points a frame, evenly"
+    )
+    series = PointSeries(time[SKIPPED:], kept, correspondence=False)
     return Recording(name, series, Motion.from_positions(time, command[:, None]), name.removesuffix("2"))

@@ -113,3 +113,38 @@ def test_repeats_that_are_too_short_tell_nothing() -> None:
     time = np.arange(0, 0.09, 0.01)
     a, b = (Recording(n, PointSeries(time, np.ones((9, 2, 3))), motion="same") for n in "ab")
     assert _from_repeats(a, b) is None
+
+
+def waving_sheet(time: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Places ``(T, P, 2)`` of a bumpy sheet that is carried along x and waves, ``(T, P, 3)`` [m]."""
+    a, b = places[..., 0], places[..., 1]
+    lift = 0.03 * np.sin(20 * a + 6 * time[:, None]) + 0.02 * np.cos(30 * b)
+    return np.stack([a + 0.3 * np.sin(2 * time)[:, None], b, lift], axis=-1)
+
+
+def test_a_cloud_finds_its_offsets_though_its_points_are_nobodys() -> None:
+    time = np.arange(0, 1, 0.05)
+    rng = np.random.default_rng(1)
+    seen = waving_sheet(time + 0.04, rng.uniform(0, 0.2, (len(time), 150, 2)))  # other points in every frame
+    away = np.array([0.012, -0.015, 0.008])
+    recording = Recording("a", PointSeries(time, seen + away, correspondence=False))
+    places = np.broadcast_to(rng.uniform(0, 0.2, (1, 4000, 2)), (len(time), 4000, 2))
+    predicted = PointSeries(time, waving_sheet(time, places), correspondence=False)
+    r = residual(recording, predicted, NOISE, Offsets(clock=0.1, constant=0.03))
+    assert r.clock == pytest.approx(0.04, abs=5e-3)
+    np.testing.assert_allclose(r.white[-3:] * 0.03, away, atol=1.5e-3)
+    assert r.rms < 0.002 < 0.004 < residual(recording, predicted, NOISE, Offsets()).rms
+
+
+def test_a_cloud_with_gaps_is_held_against_what_was_predicted() -> None:
+    time = np.arange(0, 0.5, 0.05)
+    places = np.random.default_rng(0).uniform(0, 0.2, (len(time), 441, 2))
+    points, model = waving_sheet(time, places), waving_sheet(time, places)
+    points[:, ::3] = np.nan
+    model[:, 1::3] = np.nan
+    points[2], model[4] = np.nan, np.nan
+    recording = Recording("a", PointSeries(time, points, correspondence=False))
+    r = residual(recording, PointSeries(time, model, correspondence=False), NOISE, Offsets())
+    assert np.isnan(r.difference[:, ::3]).all() and np.isnan(r.difference[[2, 4]]).all()
+    kept = np.delete(r.difference, [2, 4], axis=0)[:, 2::3]
+    assert np.abs(kept).max() == 0.0

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from muslin.core.errors import InputError
 from muslin.core.frames import Frames
+from muslin.core.subsets import even_subset, outermost
 from muslin.perception.color_mask import ColorMaskExtractor
 from muslin.perception.colour import ColourRange, object_mask
-from muslin.perception.subsets import even_subset, outermost
 
 TIME = np.arange(3) / 30.0
 RED, GREY = (196, 72, 50), (150, 156, 168)

@@ -200,14 +200,25 @@ def test_without_a_hand_the_tracked_edge_carries(tmp_path: Path) -> None:
     np.testing.assert_allclose(take.gripper.poses[0, 0, :3], take.series.points[0, :5].mean(axis=0), atol=1e-9)
 
 
-def test_clouds_have_no_correspondence_and_skip_the_arm(tmp_path: Path) -> None:
+def test_clouds_are_thinned_lose_what_stands_alone_and_skip_the_arm(tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     time = 0.1 * np.arange(12)
-    np.savez(tmp_path / "fold_x2.npz", points=rng.normal(size=(12, 30, 3)), gripper_cmd=np.ones((12, 3)), t=time)
-    (take,), _ = read("cloth-cloud", tmp_path)
+    clouds = rng.uniform(0.0, 0.3, (12, 8000, 3)) * (1.0, 1.0, 0.02)
+    clouds[:, :3] = [[0.1, 0.1, 0.4], [9.0, 0.0, 0.0], [0.5, 0.1, 0.0]]
+    np.savez(tmp_path / "fold_x2.npz", points=clouds, gripper_cmd=np.ones((12, 3)), t=time)
+    (take,), said = read("cloth-cloud", tmp_path)
     assert not take.series.correspondence and take.motion == "fold_x"
     np.testing.assert_allclose(take.series.time, time[5:])
     assert take.gripper is not None and take.gripper.times[0] == 0.0
+    points = take.series.points
+    assert points.shape == (7, 600, 3) and np.isfinite(points).all()
+    assert points.min() >= 0.0 and points.max() <= 0.3 and points[..., 2].max() <= 0.006
+    counts = np.histogram2d(*points[0, :, :2].T, bins=3, range=[[0, 0.3]] * 2)[0]
+    assert counts.min() > 0.7 * 600 / 9  # every part of the sheet keeps its share
+    assert "21 points that stand alone; kept 600 of 8000 points a frame" in said[0]
+    np.savez(tmp_path / "fold_x2.npz", points=10.0 * clouds, gripper_cmd=np.ones((12, 3)), t=time)
+    with pytest.raises(InputError, match="frame 5 shows no sheet: no 12 of its points lie together"):
+        read("cloth-cloud", tmp_path)
 
 
 def test_what_is_wrong_is_said(tmp_path: Path) -> None:

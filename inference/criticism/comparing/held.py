@@ -71,11 +71,15 @@ class Held:
         if self.marked:
             near = cKDTree(body.vertices).query(self.scenario.markers @ body.vertices)[1]
             return np.tile(near, (len(model), 1))
-        shapes = self.best.vertices
-        if self.best.series.unit == "px":
-            assert self.scenario.camera is not None
-            shapes = self.scenario.camera.project(shapes)[0]
-        return np.stack([_nearest(v, p) for v, p in zip(shapes, model, strict=True)])
+        return np.stack([_nearest(v, p) for v, p in zip(self.shapes, model, strict=True)])
+
+    @cached_property
+    def shapes(self) -> FloatArray:
+        """The predicted vertices ``(T, V, A)``, as the camera sees them where points are pixels."""
+        if self.best.series.unit == "m":
+            return self.best.vertices
+        assert self.scenario.camera is not None
+        return self.scenario.camera.project(self.best.vertices)[0]
 
     @property
     def usual_vertex(self) -> IntArray:
@@ -98,12 +102,12 @@ class Held:
         if self.paired:
             return model
         out = np.full(measured.shape, np.nan)
-        lattice = surface_lattice(self.scenario, model) if self.marked else None
+        lattice = surface_lattice(self.scenario) if self.marked else None
         for t, seen in enumerate(self.recording.series.valid):
             if not seen.any():
                 continue
             if lattice is not None:
-                places = lattice @ model[t]
+                places = lattice @ self.shapes[t]
                 out[t, seen] = places[cKDTree(places).query(measured[t, seen])[1]]
             elif seen.sum() <= model.shape[1]:
                 gaps = ((measured[t, seen][:, None] - model[t][None]) ** 2).sum(axis=2)

@@ -3,7 +3,6 @@
 import numpy as np
 from scipy import sparse
 
-from ....core.arrays import FloatArray
 from ....core.scenario import Scenario
 
 #: Places on the object, at most.
@@ -12,18 +11,14 @@ _MOST = 20_000
 _FINEST = 16
 
 
-def surface_lattice(scenario: Scenario, model: FloatArray) -> sparse.csr_array | None:
+def surface_lattice(scenario: Scenario) -> sparse.csr_array | None:
     """Weights ``(L, V)`` of places spread over the surface, or along a rope; vertices among them.
 
-    Args:
-        scenario: of the object.
-        model: predicted points ``(T, Q, A)``.
-
     Returns:
-        None where the predicted points are markers and not the vertices themselves: then only they can be seen.
+        None where the predicted points are some marked spots: then only they can be seen.
     """
     count = len(scenario.body.vertices)
-    if model.shape[1] != count or not np.array_equal(scenario.markers, np.eye(count)):
+    if not scenario.sampled and not np.array_equal(scenario.markers, np.eye(count)):
         return None
     body = scenario.body
     corners = body.elements if body.kind == "rope" else body.triangles

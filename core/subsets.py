@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..core.arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray
 
 #: Bits a coordinate of the curve has: cells along each axis are a power of two.
 _BITS = 16
@@ -31,6 +31,22 @@ def even_subset(cells: IntArray, count: int) -> IntArray:
     # of equal shares of the curve the middle ones
     place = ((np.arange(count) + 0.5) * len(cells) / count).astype(int)
     return np.sort(np.argsort(key, kind="stable")[place])
+
+
+def thinned(places: FloatArray, voxel: float, count: int) -> FloatArray:
+    """One of ``places (N, 3)`` in every voxel, the first of them, and of these at most ``count`` that cover evenly.
+
+    Args:
+        places: of a cloud [m].
+        voxel: its side [m].
+        count: how many are wanted.
+    """
+    if not len(places):
+        return places
+    cells = np.floor(places / voxel).astype(np.int64)
+    cells -= cells.min(axis=0)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return places[first[even_subset(cells[first], count)]]
 
 
 def outermost(points: FloatArray, count: int) -> IntArray:
