@@ -97,9 +97,25 @@ def carried_cloth(folder: Path, workers: int | None) -> Study:
     return Study.load(folder / "study.toml", workers=workers)
 
 
+def cloud(motion: str, sheet: str) -> Case:
+    """One trial of a sheet is fitted, the other held out."""
+
+    def make(folder: Path, workers: int | None) -> Study:
+        config = read_config(EXAMPLES / f"cloth_cloud/{motion}.toml")
+        config.study.fit_on, config.study.hold_out = [f"{motion}_{sheet}"], [f"{motion}_{sheet}2"]
+        shutil.copy(EXAMPLES / f"cloth_cloud/{motion}.obj", folder)
+        takes = takes_of("cloth-cloud", DATA / "cloth_cloud", [*config.study.fit_on, *config.study.hold_out])
+        save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
+        write_config(config, folder / "study.toml")
+        return Study.load(folder / "study.toml", workers=workers)
+
+    return Case(f"cloud: {motion} {sheet}", DATA / "cloth_cloud", make)
+
+
 CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
     Case("beam", EXAMPLES / "beam/data", beam),
     *(cable(number) for number in (1, 2, 3)),
     Case("carried cloth", DATA / "cloth_carried", carried_cloth, open_loop=True),
+    *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]

@@ -88,3 +88,22 @@ def test_a_mesh_in_pieces_is_remarked_on(tmp_path: Path, capsys: pytest.CaptureF
     base = ("new", tmp_path / "s.toml", "--measurement", measurement, "--scenario", "swing")
     assert status(*base, "--mesh", tmp_path / "two.obj", "--grasp-points", "-0.1,0,0") == 0
     assert "2 parts that do not hang together" in capsys.readouterr().out
+
+
+def test_a_cloud_is_held_against_the_surface(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = preset("fling").scenario(vertices=[3, 3])
+    rng = np.random.default_rng(0)
+    cloud = rng.uniform(-0.1, 0.1, (5, 40, 3)) + scenario.start_vertices().mean(axis=0)
+    series = PointSeries(np.linspace(0, 0.2, 5), cloud, correspondence=False)
+    save_measurement(Measurement((Recording("one", series, scenario.motion),)), tmp_path / "m.zarr")
+    path = tmp_path / "s.toml"
+    options = ("--measurement", tmp_path / "m.zarr", "--scenario", "fling", "--vertices", "3,3")
+    assert status("new", path, *options) == 0, capsys.readouterr().err
+    assert "the 40 points are a cloud, held against the whole surface" in capsys.readouterr().out
+    config = read_config(path)
+    assert config.scenario.markers == "surface"
+    made = build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path).scenarios["one"]
+    assert made.sampled and len(made.markers) == 1000
+    assert status("new", path, *options, "--force", "--markers", "all") == 0
+    made = build_problem(read_config(path), load_measurement(tmp_path / "m.zarr"), tmp_path).scenarios["one"]
+    assert not made.sampled and len(made.markers) == 9

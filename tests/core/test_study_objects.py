@@ -233,3 +233,8 @@ def test_paths_start_at_the_study_file_and_results_at_the_content(
     assert len(study.add("wind", elsewhere).problem.scenarios["a"].body.vertices) == 5
     (folder / "parts" / "sheet.obj").write_text(SHEET.replace("-0.2", "-0.21"))
     assert Study.load(path).fingerprint() != before
+
+
+def test_points_that_are_followed_are_not_held_against_the_surface(folder: Path) -> None:
+    told = complaint(folder, name="swing", mesh="sheet.obj", grasp_points=[[-0.1, 0, 0]], markers="surface")
+    assert "is for clouds" in told and "'a' follows its points" in told
