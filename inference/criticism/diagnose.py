@@ -40,7 +40,9 @@ def diagnose(study: Study) -> Diagnosis:
         found = find(work, names, _fitted(study))
         # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain
         started = work.space(()), _fitted(study)
-        pair = BeforeAfter(work, started, (found.after.space, found.after.fit.unit))
+        changed = found.verdict in ("named", "tied")
+        later = work.as_a_user_fits(found.after) if changed else found.after.fit.unit
+        pair = BeforeAfter(work, started, (found.after.space, later))
         plain = found.first.plain
         joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
         found = replace(found, after=joint.nearest)

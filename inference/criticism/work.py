@@ -19,6 +19,9 @@ from .held_out import held_out_residuals
 from .numerics import numerical_directions
 from .verdict import Evidence
 
+#: Least-squares evaluations of the model that is told of, beside a user's own fit.
+USER_EVALUATIONS = 8
+
 
 class Work:
     """Rollouts of one diagnosis.
@@ -82,6 +85,20 @@ class Work:
         left = max(1, (self.limit - self.count) // len(self.problem.fit_on) - 2 * len(objective.space))
         self.cut_short |= left < evaluations
         return polish(objective, start, min(evaluations, left))
+
+    def as_a_user_fits(self, candidate: Candidate) -> FloatArray:
+        """Where a fit of the model with the candidate ends that leaves nothing to numerics: as ``muslin fit`` does it.
+
+        A diagnosis fits beside what a finer mesh or another engine would change, so its own fit may be far off the
+        measurement along those directions, and its errors would not compare with those of the user's model.
+        """
+        if not self.discrepancy.directions:
+            return candidate.fit.unit
+        objective = Objective(
+            self.pool, candidate.space, self.problem.fit_on, self.fit.noise, self.offsets,
+            discrepancy=replace(self.discrepancy, directions={}),
+        )  # fmt: skip
+        return polish(objective, candidate.fit.unit, USER_EVALUATIONS).unit
 
     def roughly_polished(
         self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None

@@ -1,0 +1,52 @@
+"""What a diagnosis tells of errors is of fits as a user makes them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+from test_verdict import candidate
+
+from muslin.core.measurement import Recording
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.core.rollout import Trajectory
+from muslin.core.series import PointSeries
+from muslin.inference.criticism.work import Work
+from muslin.inference.discrepancy import Discrepancy
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, polish
+from muslin.inference.residuals import Offsets
+
+TIME = np.linspace(0.0, 1.0, 20)
+WAVE = np.stack([np.sin(7 * TIME), TIME], axis=1)[:, :, None] * (0.05, 0.0, 0.02)  # (T, 2, 3)
+#: What no height of the wave explains.
+OTHER = np.roll(WAVE, 1, axis=1) * (1, 0, -1)
+BEST = 0.3
+NOISE = Noise(0.001, 0.0, "test", "m", 0.01)
+SPACE = ParameterSpace((Parameter("a", "1", 0.0, 1.0),))
+
+
+class Pool:
+    """Simulates a wave as high as its parameter."""
+
+    problem = SimpleNamespace(recordings={"r": Recording("r", PointSeries(TIME, BEST * WAVE + 0.2 * OTHER))})
+
+    def map(self, tasks: list[SimpleNamespace]) -> list[Trajectory]:
+        made = [PointSeries(TIME, task.values["a"] * WAVE) for task in tasks]
+        return [Trajectory(series, series.points, np.zeros((len(TIME), 1, 7))) for series in made]
+
+
+def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
+    """A finer mesh would change the wave and the other together, so beside it the wave is fitted too low."""
+    pool = Pool()
+    numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
+    work = SimpleNamespace(
+        pool=pool, problem=SimpleNamespace(fit_on=("r",)), fit=SimpleNamespace(noise=NOISE), offsets=Offsets(),
+        discrepancy=numerics,
+    )  # fmt: skip
+    beside = polish(Objective(pool, SPACE, ("r",), NOISE, Offsets(), discrepancy=numerics), np.array([0.8]), 8)  # type: ignore[arg-type]
+    assert abs(beside.unit[0] - BEST) > 0.1
+    plain = polish(Objective(pool, SPACE, ("r",), NOISE, Offsets()), np.array([0.8]), 8)  # type: ignore[arg-type]
+    found = candidate("drag", 1.0)
+    found.__dict__.update(space=SPACE, fit=beside)
+    np.testing.assert_allclose(Work.as_a_user_fits(work, found), [plain.unit[0]], atol=1e-3)  # type: ignore[arg-type]
+    work.discrepancy = Discrepancy()
+    np.testing.assert_array_equal(Work.as_a_user_fits(work, found), beside.unit)  # type: ignore[arg-type]
