@@ -113,7 +113,7 @@ def unrepeatable(rough: Roughness, recordings: Mapping[str, Recording], noise: N
     for name, sd in rough.sd.items():
         frames = np.flatnonzero(sd > noise.sd)
         if len(frames):
-            size = f"{1e3 * sd.max():.0f} mm" if noise.unit == "m" else f"{sd.max():.0f} px"
+            size = f"{1e3 * sd.max():.2g} mm" if noise.unit == "m" else f"{sd.max():.2g} px"
             since = recordings[name].series.time[frames[0]]
             out.append(f"{name} from {since:.2f} s on, by up to {size}")
     return out

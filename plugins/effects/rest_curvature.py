@@ -23,9 +23,11 @@ class RestCurvature(Effect):
     vertices mass times acceleration is the sum of weight, tension and the forces of the bending moments m, three
     equations a vertex for two moments a vertex and one tension a segment. What the grippers give at both ends remains
     open; of all moments that are in balance those are taken that leave the smallest natural curvature
-    :math:`\kappa_0 = \kappa - m / EI`, in the mean square along the rope. The couple :math:`EI \kappa_0`, fixed in
-    the material, then acts at every vertex, times ``share``: 1 is exactly in balance. The material does not spin
-    about the rope's own axis (:class:`~muslin.plugins.effects.hinges.RopeBending`): neither do the grippers.
+    :math:`\kappa_0 = \kappa + \beta \dot\kappa - m / EI`, in the mean square along the rope; the damping time
+    :math:`\beta` counts because a rope that is bending as it starts owes a part of its moments to that. The couple
+    :math:`EI \kappa_0`, fixed in the material, then acts at every vertex, times ``share``: 1 is exactly in balance.
+    The material does not spin about the rope's own axis (:class:`~muslin.plugins.effects.hinges.RopeBending`):
+    neither do the grippers.
 
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
@@ -46,7 +48,7 @@ class RestCurvature(Effect):
             return None
         bending = RopeBending(scene.body)
         bending.follow(scene.start_positions)
-        natural = natural_curvature(bending, scene, masses, scene.material.bending_rigidity)
+        natural = natural_curvature(bending, scene, masses, scene.material)
         moments = -self.values["share"] * scene.material.bending_rigidity * natural
 
         def force(time: float, state: State) -> FloatArray:
@@ -56,15 +58,16 @@ class RestCurvature(Effect):
         return force
 
 
-def natural_curvature(bending: RopeBending, scene: Scene, masses: FloatArray, rigidity: float) -> FloatArray:
+def natural_curvature(bending: RopeBending, scene: Scene, masses: FloatArray, material: RopeMaterial) -> FloatArray:
     """The smallest ``(V - 2, 2)`` [1/m] that gives the start its acceleration; see :class:`RestCurvature`.
 
     Args:
         bending: followed to the start.
-        scene: where it starts, and how it is accelerated then; at rest where that is not known.
+        scene: where it starts, how it moves and how it is accelerated then; at rest where that is not known.
         masses: of the vertices ``(V,)`` [kg].
-        rigidity: E I [N m2].
+        material: whose bending rigidity and damping time count.
     """
+    rigidity = material.bending_rigidity
     start, places = scene.start_positions, len(bending.measures)
     free = np.setdiff1d(np.arange(len(start)), scene.held)
     unit = np.eye(2 * places).reshape(-1, places, 2)
@@ -89,7 +92,9 @@ def natural_curvature(bending: RopeBending, scene: Scene, masses: FloatArray, ri
     clamped = np.asarray(np.isin(scene.body.elements, scene.held).all(axis=1))
     # beside a segment that is held at both ends all of the turn is that of the other half
     share = np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
-    curvature = (share[:, None] * bending.curvature).ravel()
+    moving = np.zeros_like(start) if scene.start_velocities is None else scene.start_velocities
+    damped = bending.curvature + material.damping_time * bending.rates(moving)
+    curvature = (share[:, None] * damped).ravel()
     ways, extents, _ = np.linalg.svd(weight[:, None] * open_, full_matrices=False)
     ways = ways[:, extents > _RANK * weight.max()]  # what is left open may be tension alone, as of a held segment
     most = (ways @ (ways.T @ (weight * (curvature - one)))) / weight

@@ -19,25 +19,48 @@ import numpy as np
 from real_cases import CASES, Case
 from table import RESULTS, machine, versions
 
+from muslin.core.errors import RolloutFailed
 from muslin.core.registry import REGISTRY
-from muslin.core.study import Study
+from muslin.core.study import Problem, Study, build_problem
 
 COLUMNS = ("baseline", "unfitted", "fitted", "after", "noise")
 TITLES = ("set", "fitted on", "held out", *COLUMNS, "verdict", "rollouts", "seconds")
 
 
-def absolute(study: Study, values: Mapping[str, float], effects: list[str]) -> dict[str, float]:
-    """Errors [m] on held-out takes: of a point, the median; of a coordinate, the mean absolute one."""
-    problem = replace(study.problem, effects={n: REGISTRY.get("effect", n) for n in effects})
-    off = []
+def absolute(problem: Problem, values: Mapping[str, float], effects: list[str]) -> dict[str, float]:
+    """Errors [m] on the held-out takes of ``problem``: of a point, the median; of a coordinate, the mean absolute one.
+
+    ``median_take`` is the median over takes of the latter, ``failed`` how many takes could not be simulated.
+    """
+    problem = replace(problem, effects={n: REGISTRY.get("effect", n) for n in effects})
+    off, failed = [], 0
     for name in problem.hold_out:
-        difference = problem.simulate(values, name).series.points - problem.recordings[name].series.points
+        try:
+            simulated = problem.simulate(values, name).series.points
+        except RolloutFailed:
+            failed += 1
+            continue
+        difference = simulated - problem.recordings[name].series.points
         off.append(difference[np.isfinite(difference).all(axis=2)])
     every = np.concatenate(off)
     return {
+        "takes": len(off),
+        "failed": failed,
         "median_point": float(np.median(np.linalg.norm(every, axis=1))),
         "mean_coordinate": float(np.mean(np.abs(every))),
+        "median_take": float(np.median([np.mean(np.abs(o)) for o in off])),
     }
+
+
+def never_used(study: Study) -> Problem | None:
+    """Of the takes that are in the measurement and neither fitted nor held out, as held-out ones; None without any."""
+    known = {*study.problem.fit_on, *study.problem.hold_out}
+    left = [n for n in study.measurement.names if n not in known]
+    if not left:
+        return None
+    config = study.config.model_copy(deep=True)
+    config.study.hold_out = left
+    return build_problem(config, study.measurement, study.path.parent)
 
 
 def row_of(case: Case, study: Study) -> dict[str, Any]:
@@ -68,14 +91,26 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
         ],
     }
     if case.open_loop:
-        space = study.problem.space
-        row["unfitted open loop"] = absolute(study, space.as_dict(space.from_unit(np.full(len(space), 0.5))), [])
-        row["fitted open loop"] = absolute(study, fit.values(), [])
-        models = study.results()["diagnose"].attrs["models"]
-        named = [m for m in models if found["effects"] and m["effects"] in (found["effects"], found["effects"][:1])]
-        if named:
-            row["after open loop"] = absolute(study, named[0]["values"], named[0]["effects"])
+        row |= open_loop(study, fit.values(), found["effects"])
     return row | {"machine": machine(), "versions": versions()}
+
+
+def open_loop(study: Study, fitted: Mapping[str, float], effects: list[str]) -> dict[str, Any]:
+    """:func:`absolute` of the middle of the prior, of the fit, and with what was named; on takes never used, too."""
+    space = study.problem.space
+    states = {"unfitted": (space.as_dict(space.from_unit(np.full(len(space), 0.5))), []), "fitted": (fitted, [])}
+    models = study.results()["diagnose"].attrs["models"]
+    for model in models:
+        if effects and model["effects"] in (effects, effects[:1]):
+            states["after"] = model["values"], model["effects"]
+            break
+    problems = {"open loop": study.problem, "never used": never_used(study)}
+    return {
+        f"{state} {which}": absolute(problem, values, added)
+        for which, problem in problems.items()
+        if problem is not None
+        for state, (values, added) in states.items()
+    }
 
 
 def rms(errors: list[float]) -> float:
@@ -106,14 +141,22 @@ def markdown(rows: list[dict[str, Any]], skipped: Mapping[str, str]) -> str:
         lines.append("| " + " | ".join([*cells, str(r["rollouts"]), f"{r['seconds']:.0f}"]) + " |")
     lines += ["", "Errors on held-out takes in mm, root mean square a coordinate.", ""]
     for r in rows:
-        for state in ("unfitted", "fitted", "after"):
-            if (e := r.get(f"{state} open loop")) is not None:
+        for state in (f"{s} {w}" for w in ("open loop", "never used") for s in ("unfitted", "fitted", "after")):
+            if (e := r.get(state)) is not None:
                 lines.append(
-                    f"- {r['set']}, {state}, open loop: median point error {1e3 * e['median_point']:.1f} mm, mean "
-                    f"absolute coordinate error {1e3 * e['mean_coordinate']:.1f} mm"
+                    f"- {r['set']}, {state.replace('never used', 'open loop on takes never used')}: median point error "
+                    f"{1e3 * e['median_point']:.1f} mm, mean absolute coordinate error "
+                    f"{1e3 * e['mean_coordinate']:.1f} mm{_of_takes(e)}"
                 )
     lines += [f"- skipped: {name}: {why}" for name, why in skipped.items()]
     return "\n".join(lines) + "\n"
+
+
+def _of_takes(e: Mapping[str, float]) -> str:
+    if "takes" not in e:
+        return ""
+    failed = f", {e['failed']} more could not be simulated" if e["failed"] else ""
+    return f" ({1e3 * e['median_take']:.1f} mm in the median over {e['takes']} takes{failed})"
 
 
 def main() -> None:

@@ -81,10 +81,10 @@ def test_an_arc_without_weight_is_all_natural_curvature_or_none() -> None:
     bending.follow(arc)
     masses = 0.05 * body.vertex_measures
     # clamped at one end alone nothing but its own bend can hold it in this shape; clamped at both the ends can
-    bent = np.linalg.norm(natural_curvature(bending, free, masses, 2e-3), axis=1)
+    bent = np.linalg.norm(natural_curvature(bending, free, masses, MATERIAL), axis=1)
     np.testing.assert_allclose(bent[:-1], 1.0, rtol=1e-6)
     held = replace(free, grasps=(np.array([0, 1]), np.array([19, 20])))
-    assert np.abs(natural_curvature(bending, held, masses, 2e-3)).max() < 1e-6
+    assert np.abs(natural_curvature(bending, held, masses, MATERIAL)).max() < 1e-6
 
 
 def test_what_moves_freely_needs_no_bend() -> None:
@@ -95,11 +95,34 @@ def test_what_moves_freely_needs_no_bend() -> None:
     falling = Scene(body, MATERIAL, gravity, held, np.zeros(21), start_accelerations=np.tile(gravity, (21, 1)))
     bending = RopeBending(body)
     masses = 0.05 * body.vertex_measures
-    assert np.abs(natural_curvature(bending, falling, masses, 2e-3)).max() < 1e-9
+    assert np.abs(natural_curvature(bending, falling, masses, MATERIAL)).max() < 1e-9
     still = replace(falling, start_accelerations=None)
     # at rest, sticking out from the clamp, its bend carries the weight of all that is beyond: m = w (l - x)^2 / 2
-    moment = 2e-3 * np.linalg.norm(natural_curvature(bending, still, masses, 2e-3), axis=1)
+    moment = 2e-3 * np.linalg.norm(natural_curvature(bending, still, masses, MATERIAL), axis=1)
     np.testing.assert_allclose(moment, 0.05 * 9.81 * 0.5 * (1.0 - np.arange(1, 20) / 20) ** 2, rtol=1e-6)
+
+
+def test_what_damping_gives_is_no_bend() -> None:
+    """A straight rope without weight that starts to bend, with the acceleration that its damping then gives it."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 21)
+    masses, beta = 0.05 * body.vertex_measures, 0.02
+    bending = RopeBending(body)
+    x = body.vertices[:, 0]
+    velocities = np.stack([0 * x, 0 * x, np.maximum(x - 0.1, 0.0) ** 2 * (1.0 - x)], axis=1)
+    forces = bending.forces(2e-3 * beta * bending.rates(velocities))
+    held = (np.array([0, 1]),)
+    bent = Scene(
+        body,
+        replace(MATERIAL, damping_time=beta),
+        np.zeros(3),
+        held,
+        np.zeros(21),
+        start_velocities=velocities,
+        start_accelerations=forces / masses[:, None],
+    )
+    assert np.abs(natural_curvature(bending, bent, masses, replace(MATERIAL, damping_time=beta))).max() < 1e-9
+    undamped = natural_curvature(bending, bent, masses, MATERIAL)
+    assert np.abs(undamped).max() > 0.5 * beta * np.abs(bending.rates(velocities)).max()
 
 
 def test_it_is_offered_only_where_the_start_was_measured() -> None:
