@@ -1,19 +1,24 @@
 """Where the measured points sit on the mesh, as far as the first frame tells."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ..core.arrays import FloatArray
 from ..core.body import Body
 from ..core.errors import InputError
-from ..core.measurement import Measurement
+from ..core.measurement import Measurement, Recording
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
 _CHOICES = ("all", "bound", "surface", "nearest")
 #: A point further than this share of the object's size from the mesh is probably in another frame.
 _FAR = 0.25
+#: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
+#: and the way from one to the next as long at most, over the shortest tree through them.
+_FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
 
 
 def parse_markers(text: str) -> str | list[int] | None:
@@ -30,21 +35,27 @@ def parse_markers(text: str) -> str | list[int] | None:
         ) from error
 
 
-def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body) -> tuple[Plan, list[str]]:
+def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, sized: bool) -> tuple[Plan, list[str]]:
     """The plan with markers that the mesh and the recordings allow, and remarks for the person.
 
     Points that are as many as vertices sit on the vertices; else a solid carries each where it is in
-    the first frame, and on cloth and ropes each sits on the nearest vertex.
+    the first frame, and on cloth and ropes each sits on the nearest vertex. A rope whose markers reach from one
+    gripper to the other starts through them.
 
     Args:
         plan: of the study.
         measured: the measurement.
         study: the study file.
         body: the object.
+        sized: the person gave its size.
     """
     if plan.markers is not None and plan.markers != "nearest":
         return plan, []
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
+    if plan.markers is None and not sized and starts_measured(plan, used):
+        return replace(plan, start="measured"), [
+            "every take starts through its markers, from one gripper to the other; its length follows from them"
+        ]
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
     if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
@@ -56,6 +67,43 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body) ->
             f"the {count} points are tied to the object where they are in the first frame"
         ]
     return _on_nearest(plan, measured, study, count)
+
+
+def starts_measured(plan: Plan, used: Sequence[Recording]) -> bool:
+    """Whether every take shows a rope from one gripper to the other in its first frame, marker by marker.
+
+    Then its length and its shape at the start are known, and need not be guessed by letting a rope of some length hang.
+    """
+    if plan.kind != "rope" or plan.mesh is not None or plan.grasp_points is not None:
+        return False
+    return len(plan.held) == 2 and all(_from_end_to_end(r, plan.points) for r in used)
+
+
+def _from_end_to_end(recording: Recording, kept: list[int] | None) -> bool:
+    series, gripper = recording.series, recording.gripper
+    if not series.correspondence or series.unit != "m" or gripper is None or gripper.grippers != 2:
+        return False
+    first = series.points[0] if kept is None else series.points[0][kept]
+    if len(first) < _FEWEST_MARKERS or first.shape[1] != 3 or not np.isfinite(first).all():
+        return False
+    ends = gripper.at(series.time[:1])[0, :, :3]
+    steps = np.linalg.norm(np.diff(first, axis=0), axis=1)
+    near = np.linalg.norm(first[[0, -1]] - ends, axis=1) < _AT_THE_GRIPPER * steps.sum()
+    # the shortest tree through markers in their order is the rope itself; numbered some other way they jump to and fro
+    return bool(near.all() and (steps > 0).all() and steps.sum() < _IN_ORDER * _shortest_tree(first))
+
+
+def _shortest_tree(points: FloatArray) -> float:
+    """How long the shortest tree through ``points (P, 3)`` is [m], by Prim's algorithm."""
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    away, total = apart[0], 0.0
+    left = np.arange(len(points)) > 0
+    while left.any():
+        nearest = int(np.argmin(np.where(left, away, np.inf)))
+        total += away[nearest]
+        left[nearest] = False
+        away = np.minimum(away, apart[nearest])
+    return float(total)
 
 
 def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> tuple[Plan, list[str]]:

@@ -134,7 +134,7 @@ def new(
     )
     remarks: list[str] = []
     if plan.extractor is None:
-        plan, remarks = place_markers(plan, measured, study, body)
+        plan, remarks = place_markers(plan, measured, study, body, sized=bool(sizes))
     elif markers.strip():
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
     else:
@@ -146,6 +146,8 @@ def new(
     say(f"wrote {study}: fits {body.kind} {scenario!r} on {', '.join(fitted)}")
     if held:
         say(f"  held out: {', '.join(held)}")
+    elif len(fitted) > 1:
+        say(f"  nothing is held out, so no claim is checked on a motion that was not fitted: --hold-out {fitted[-1]}")
     for remark in remarks:
         say(f"  {remark}")
     next_step(command("fit", study), note="look through the study file first")

@@ -10,8 +10,10 @@ import numpy as np
 
 from ..core.material import UNITS
 from ..core.obstacles import Obstacle
+from ..core.parameters import Parameter
 from ..core.registry import REGISTRY
-from ..core.scenarios import SIZES, Preset, preset
+from ..core.scenarios import SIZES, preset
+from ..core.scenarios.measured import MEASURED_PRIORS
 from ..core.study.config import DiagnoseTable, EstimatorTable
 
 
@@ -33,6 +35,7 @@ class Plan:
         points: measured points to compare, None for all.
         markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
         extractor: name and options of what found the points in pictures, or None where they were measured.
+        start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
     """
 
     measurement: str
@@ -51,6 +54,12 @@ class Plan:
     points: list[int] | None
     markers: str | list[int] | None
     extractor: dict[str, Any] | None = None
+    start: str | None = None
+
+    @property
+    def priors(self) -> tuple[Parameter, ...]:
+        """What is inferred."""
+        return MEASURED_PRIORS if self.start else preset(self.scenario).default_priors(self.kind)
 
 
 def plan_table(plan: Plan) -> dict[str, Any]:
@@ -60,15 +69,14 @@ def plan_table(plan: Plan) -> dict[str, Any]:
 
 def study_text(plan: Plan) -> str:
     """The whole file."""
-    base = preset(plan.scenario)
     parts = [
         "# A study: fit a simulator to a measurement, see where it fails, name what is missing.",
         "# All units are SI (m, kg, s, N, Pa, rad); z is up. Lines that start with # are off.",
         _study(plan),
         _scenario(plan),
         _plugins(plan),
-        _material(base, plan.kind),
-        _parameters(base, plan.kind),
+        _material(plan),
+        _parameters(plan),
         _effects(plan.kind),
         _rest(),
     ]
@@ -105,15 +113,10 @@ def _scenario(plan: Plan) -> str:
             "[scenario]",
             f"name = {_value(plan.scenario)}",
             *_object(plan),
-            '# The frame of the object: "gripper" (of the first gripper at its first pose), "upright" (from that',
-            '# gripper along the axes of the world) or "world" (as it stands at the start).',
-            '# frame = "gripper"',
-            '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
-            '# first frame), "surface" (anywhere: clouds), or a vertex number for each.',
-            f"markers = {_value(plan.markers)}",
+            *([] if plan.start else _placed(plan)),
             f"{points}  # measured points to compare, from 0; default all",
             *_grasps(plan),
-            f"settle = {base.settle:g}  # time to come to rest before the first frame [s]",
+            *([] if plan.start else [f"settle = {base.settle:g}  # time to come to rest before the first frame [s]"]),
             "# What stands around the object, in the world [m]; friction times the material's own is the Coulomb "
             "coefficient.",
             *obstacles,
@@ -125,7 +128,25 @@ def _scenario(plan: Plan) -> str:
     )
 
 
+def _placed(plan: Plan) -> list[str]:
+    return [
+        '# The frame of the object: "gripper" (of the first gripper at its first pose), "upright" (from that',
+        '# gripper along the axes of the world) or "world" (as it stands at the start).',
+        '# frame = "gripper"',
+        '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
+        '# first frame), "surface" (anywhere: clouds), or a vertex number for each.',
+        f"markers = {_value(plan.markers)}",
+    ]
+
+
 def _object(plan: Plan) -> list[str]:
+    if plan.start:
+        return [
+            f"vertices = {_value(plan.vertices)}  # mesh vertices along it; numbered {_ORDER[plan.kind]}",
+            "# Every take starts through the markers of its first frame, as fast as they were, and is as long as the",
+            "# curve through them. Instead: size, markers and settle, for a rope that hangs at rest at the start.",
+            f"start = {_value(plan.start)}",
+        ]
     if plan.mesh is None:
         return [
             f"size = {_value(plan.size)}  # {', '.join(SIZES[plan.kind])} [m]",
@@ -149,10 +170,13 @@ def _object(plan: Plan) -> list[str]:
 
 
 def _grasps(plan: Plan) -> list[str]:
+    vertices = f"# grasps = {_value(plan.held)}  # for every gripper the vertices that it holds"
+    if plan.start:
+        return [vertices]
     points = plan.grasp_points
     shown = _value(points) if points is not None else "[[0.0, 0.0, 0.0]]"
     return [
-        f"# grasps = {_value(plan.held)}  # for every gripper the vertices that it holds",
+        vertices,
         "# or a point (or a list of points) for every gripper in the frame of the object [m], which holds the vertex",
         "# nearest to it and all within grasp_radius:",
         f"{'# ' if points is None else ''}grasp_points = {shown}",
@@ -208,21 +232,21 @@ def _options(kind: str, name: str) -> list[str]:
     return [f"{key} = {_value(value)}" for key, value in defaults if isinstance(value, bool | int | float | str)]
 
 
-def _material(base: Preset, kind: str) -> str:
-    inferred = {p.name for p in base.default_priors(kind)}
-    material = base.default_material(kind)
+def _material(plan: Plan) -> str:
+    inferred = {p.name for p in plan.priors}
+    material = preset(plan.scenario).default_material(plan.kind)
     lines = ["", "# What is known of the material; put in what you have weighed or looked up.", "[material]"]
     for field in fields(material):
         if field.name in inferred:
             lines.append(f"# {field.name} is inferred, see below")
         else:
-            lines.append(f"{field.name} = {_value(getattr(material, field.name))}  # [{UNITS[kind][field.name]}]")
+            lines.append(f"{field.name} = {_value(getattr(material, field.name))}  # [{UNITS[plan.kind][field.name]}]")
     return "\n".join([*lines, ""])
 
 
-def _parameters(base: Preset, kind: str) -> str:
+def _parameters(plan: Plan) -> str:
     lines = ["", "# What is inferred, with the bounds of its prior. Add any field of [material], or scale (the size)."]
-    for p in base.default_priors(kind):
+    for p in plan.priors:
         lines += [
             f"[parameters.{p.name}]  # {p.description}",
             f"low = {_value(p.low)}",
@@ -231,7 +255,12 @@ def _parameters(base: Preset, kind: str) -> str:
             f"unit = {_value(p.unit)}",
             "",
         ]
-    lines += ["# [parameters.scale]  # size of the object relative to the one given", "# low = 0.97", "# high = 1.03"]
+    if not plan.start:
+        lines += [
+            "# [parameters.scale]  # size of the object relative to the one given",
+            "# low = 0.97",
+            "# high = 1.03",
+        ]
     return "\n".join([*lines, ""])
 
 

@@ -10,9 +10,18 @@ from ..differences import fourth_differences, robust_sd
 from ..errors import InputError
 from ..measurement import Recording, check_spatial
 from ..motion import inverse, rotate
+from ..parameters import Parameter
 from ..scenario import Scenario, StartMotion
 from ..series import PointSeries
 from .starts import GivenShape
+
+#: What a new study infers of a rope that starts as it was measured: its length is known, and it does not stretch
+#: visibly. Only stiffness over mass shows in free air; the ranges suit 0.05 kg/m.
+MEASURED_PRIORS = (
+    Parameter("bending_rigidity", "N m2", 1e-5, 0.1, "log", "moment per curvature"),
+    Parameter("twist_rigidity", "N m2", 1e-5, 0.1, "log", "torque per twist rate"),
+    Parameter("damping_time", "s", 1e-4, 0.1, "log", "of internal damping, C = beta K"),
+)
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200

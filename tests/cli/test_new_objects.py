@@ -43,6 +43,51 @@ def test_a_rope(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert build_problem(config, load_measurement(measurement), tmp_path).material.kind == "rope"
 
 
+def from_end_to_end(count: int = 9) -> tuple[np.ndarray, Motion]:
+    """Markers along a rope that sags, and the grippers at the outer ones."""
+    x = np.linspace(0.0, 0.6, count)
+    points = np.stack([x, 0 * x, 0.8 + 2.0 * (x - 0.3) ** 2], axis=1)
+    return points, Motion.from_positions(np.zeros(1), points[None, [0, -1]])
+
+
+def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    measurement = save(tmp_path, *from_end_to_end())
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", measurement, "--scenario", "cable") == 0, capsys.readouterr().err
+    assert "every take starts through its markers" in capsys.readouterr().out
+    config = read_config(path)
+    assert config.scenario.start == "measured" and config.scenario.size is None and config.scenario.markers is None
+    assert list(config.parameters) == ["bending_rigidity", "twist_rigidity", "damping_time"]
+    problem = build_problem(config, load_measurement(measurement), tmp_path)
+    middle = problem.space.as_dict(problem.space.from_unit(np.full(3, 0.5)))
+    first = problem.simulate(middle, "one").series.points[0]
+    assert np.abs(first - problem.recordings["one"].series.points[0]).max() < 0.002
+    assert status("new", path, "--measurement", measurement, "--scenario", "cable", "--size", "0.8", "--force") == 0
+    assert read_config(path).scenario.start is None
+
+
+@pytest.mark.parametrize("fault", ["hidden", "out of order", "far from the grippers", "few"])
+def test_a_rope_that_is_not_seen_whole_hangs_at_the_start(tmp_path: Path, fault: str) -> None:
+    points, motion = from_end_to_end(5 if fault == "few" else 9)
+    if fault == "out of order":
+        points[[2, 6]] = points[[6, 2]]
+    if fault == "far from the grippers":
+        points += [0.0, 0.0, 0.1]
+    series = PointSeries(np.linspace(0, 0.2, 5), np.tile(points, (5, 1, 1)))
+    if fault == "hidden":
+        series.points[0, 4] = np.nan
+    takes = (
+        Recording("one", series, motion),
+        Recording("two", PointSeries(series.time, series.points[[1] * 5]), motion),
+    )
+    save_measurement(Measurement(takes), tmp_path / "m.zarr")
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
+    assert read_config(path).scenario.start is None
+
+
 def test_the_material_of_a_scenario_is_written(tmp_path: Path) -> None:
     scenario = preset("wiping").scenario(vertices=[3, 3])
     measurement = save(tmp_path, scenario.start_vertices(), scenario.motion)
