@@ -10,6 +10,7 @@ from ..core.arrays import FloatArray
 from ..core.body import Body
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
+from ..core.registry import REGISTRY
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
@@ -75,6 +76,8 @@ def starts_measured(plan: Plan, used: Sequence[Recording]) -> bool:
     Then its length and its shape at the start are known, and need not be guessed by letting a rope of some length hang.
     """
     if plan.kind != "rope" or plan.mesh is not None or plan.grasp_points is not None:
+        return False
+    if "start-velocity" not in REGISTRY.get("simulator", plan.simulator).capabilities:
         return False
     return len(plan.held) == 2 and all(_from_end_to_end(r, plan.points) for r in used)
 
