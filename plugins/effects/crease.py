@@ -45,12 +45,16 @@ class Crease(Effect):
         def force(time: float, state: State) -> FloatArray:
             nonlocal plastic
             bending.follow(state.positions)
-            elastic = bending.curvature - bending.rest - plastic
-            size = np.sqrt(np.einsum("nk,nk->n", elastic, elastic))
-            plastic = plastic + elastic * (1.0 - most / np.maximum(size, most))[:, None]
+            plastic = plastic + beyond(bending.curvature - bending.rest - plastic, most)
             return bending.forces(-rigidity * plastic)
 
         return force
+
+
+def beyond(curvature: FloatArray, most: float) -> FloatArray:
+    """What of vectors ``curvature (N, d)`` is more than ``most``, along them: the radial return of plasticity."""
+    size = np.sqrt(np.einsum("nk,nk->n", curvature, curvature))
+    return np.asarray(curvature * (1.0 - most / np.maximum(size, max(most, 1e-300)))[:, None])
 
 
 def bending_rigidity(material: object) -> FloatArray:

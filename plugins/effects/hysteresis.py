@@ -1,4 +1,4 @@
-"""Internal friction of bending: what makes a cloth or a cable stay where it was bent to."""
+"""Internal friction of bending: what makes a cloth stay where it was bent to."""
 
 from typing import ClassVar
 
@@ -9,7 +9,7 @@ from ...core.effect import Effect, NodalForce
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
-from .hinges import Bending, bending_of
+from .hinges import Bending, SheetBending
 
 #: Change of curvature [1/m] over which the friction builds up, where the time step allows so stiff a spring.
 SLIP_CURVATURE = 5.0
@@ -17,15 +17,7 @@ SLIP_CURVATURE = 5.0
 _STEADY = 0.25
 
 
-class _Hysteresis(Effect):
-    acts_on: ClassVar[str] = "force"
-    dissipative: ClassVar[bool] = True
-
-    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        return _Friction(bending_of(scene.body), self.values[self.coefficients[0].name], scene, masses)
-
-
-class BendingHysteresis(_Hysteresis):
+class BendingHysteresis(Effect):
     """Friction between the yarns of a bent cloth: M = B kappa + M_f sgn(d kappa / dt).
 
     A spring in series with a Coulomb slider at every place of the cloth, in the tensor of curvature: the friction
@@ -44,30 +36,16 @@ class BendingHysteresis(_Hysteresis):
     """
 
     name: ClassVar[str] = "bending-hysteresis"
+    acts_on: ClassVar[str] = "force"
+    dissipative: ClassVar[bool] = True
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth"})
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("friction_moment", "N", 0.0, 1e-3, description="M_f, moment per length; half of Kawabata's 2HB"),
     )
     symptom: ClassVar[str] = "springs back from every bend in the model where the real one stays a little bent"
 
-
-class RopeHysteresis(_Hysteresis):
-    """Friction between the strands of a bent rope or cable: M = E I kappa + M_f sgn(d kappa / dt).
-
-    As :class:`BendingHysteresis`, in the vector of curvature. The range is not measured: it reaches to the
-    elastic moment of a cable of E I = 1e-3 N m2 at a radius of 1 m.
-
-    References:
-        Papailiou, *On the bending stiffness of transmission line conductors*, 1997 (stick and slip of strands);
-        Prandtl, *Ein Gedankenmodell zur kinetischen Theorie der festen Körper*, 1928 (spring and slider).
-    """
-
-    name: ClassVar[str] = "rope-hysteresis"
-    object_kinds: ClassVar[frozenset[str]] = frozenset({"rope"})
-    coefficients: ClassVar[tuple[Parameter, ...]] = (
-        Parameter("friction_moment", "N m", 0.0, 1e-3, description="M_f of the whole cross-section"),
-    )
-    symptom: ClassVar[str] = "swings on and straightens in the model where the real one stays a little bent"
+    def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
+        return _Friction(SheetBending(scene.body), self.values["friction_moment"], scene, masses)
 
 
 class _Friction:

@@ -43,7 +43,7 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "gravity-tilt": ("gravity", "on_gravity", ALL, {"about_x": "rad", "about_y": "rad"}),
     "hem": ("mass", "on_loads", "cloth", {"line_mass": "kg/m"}),
     "internal-damping": ("material", "on_material", ALL, {"damping_time": "s"}),
-    "rope-hysteresis": ("force", "bind", "rope", {"friction_moment": "N m"}),
+    "rope-hysteresis": ("force", "bind", "rope", {"sliding_share": "1", "slip_curvature": "1/m"}),
     "rest-curvature": ("force", "bind", "rope", {"share": "1"}),
     "law": ("force", "bind", ALL, {c.name: c.unit for c in Law.coefficients}),
     "stick-slip": ("contact", "bind", ALL, {"excess": "1"}),
@@ -54,7 +54,8 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "wet-patch": ("mass", "on_loads", "cloth rope", {"uptake": "1", "extent": "1"}),
     "wind": ("force", "bind", ALL, {"velocity_x": "m/s", "velocity_y": "m/s"}),
 }
-#: Those that never give energy. Not so: a crease, which relieves elastic moments and works in doing so.
+#: Those that never give energy. Not so: a crease and strands that slide, which
+#: relieve elastic moments and work in doing so.
 DISSIPATIVE = {
     "air-drag",
     "anisotropic-friction",
@@ -62,7 +63,6 @@ DISSIPATIVE = {
     "capstan-friction",
     "cylinder-drag",
     "internal-damping",
-    "rope-hysteresis",
     "stick-slip",
     "viscous-damping",
 }
