@@ -21,8 +21,8 @@ from published import DATA, ROOT
 
 EXAMPLES = ROOT / "examples"
 
-#: Takes of a cable, fitted on and held out: those that start slowest, alternately, all of their 5 s. The others are
-#: never used, and the error on them is told, too.
+#: Takes of a cable, fitted on and held out, all of their 5 s: spread evenly from that which starts slowest to that
+#: which starts fastest, alternately. The others are never used, and the error on them is told, too.
 CABLE_TAKES = (5, 4)
 
 
@@ -67,24 +67,28 @@ def beam(folder: Path, workers: int | None) -> Study:
 
 
 def start_speed(recording: Recording) -> float:
-    """How fast the fastest marker is at the start [m/s], infinite where one is not seen: a rollout starts at rest."""
+    """How fast the fastest marker is at the start [m/s], infinite where one is not seen: nothing can start there."""
     steps = np.diff(recording.series.points[:6], axis=0)
     speed = np.linalg.norm(steps, axis=2).max(axis=1) / np.diff(recording.series.time[:6])
     return float(np.median(speed)) if np.isfinite(speed).all() else float("inf")
+
+
+def spread(takes: Sequence[Recording], count: int) -> list[Recording]:
+    """The middle one of each of ``count`` parts of ``takes`` that are as long as one another."""
+    return [takes[int((k + 0.5) * len(takes) / count)] for k in range(count)]
 
 
 def cable(number: int) -> Case:
     path = DATA / f"cable/cable{number}.npz"
 
     def make(folder: Path, workers: int | None) -> Study:
-        takes = sorted(takes_of("deform-cable", path), key=start_speed)
-        used = takes[: sum(CABLE_TAKES)]
+        takes = sorted((r for r in takes_of("deform-cable", path) if np.isfinite(start_speed(r))), key=start_speed)
+        used = spread(takes, sum(CABLE_TAKES))
         config = read_config(EXAMPLES / "cable/study.toml")
         config.study.hold_out = [r.name for r in used[1::2]]
         config.study.fit_on = [r.name for r in used[0::2]]
         write_config(config, folder / "study.toml")
-        seen_at_the_start = [r for r in takes if np.isfinite(start_speed(r))]
-        save_measurement(Measurement(tuple(seen_at_the_start)), folder / config.study.measurement)
+        save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
         return Study.load(folder / "study.toml", workers=workers)
 
     return Case(f"cable {number}", path, make, open_loop=True)
