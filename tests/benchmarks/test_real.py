@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import real
 from real import COLUMNS, TITLES, joined, markdown, rms
-from real_cases import CASES, Case, start_speed
+from real_cases import CASES, Case, spread, start_speed
 
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
@@ -26,6 +26,12 @@ def test_the_speed_at_the_start_is_that_of_the_fastest_marker() -> None:
     assert np.isclose(start_speed(moving(0.7)), 0.7)
     assert start_speed(moving(0.0)) == 0.0
     assert start_speed(moving(0.7, hidden=True)) == np.inf
+
+
+def test_takes_that_are_spread_are_the_middles_of_even_parts() -> None:
+    takes = [moving(0.1 * k) for k in range(15)]
+    assert spread(takes, 5) == [takes[k] for k in (1, 4, 7, 10, 13)]
+    assert spread(takes, 15) == takes
 
 
 def test_the_table_has_a_column_a_title_and_says_what_is_missing() -> None:

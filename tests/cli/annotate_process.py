@@ -24,6 +24,8 @@ class Page:
             stderr=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1"},
+            # the jobs that a shell puts in the background, as of CI, are deaf to Ctrl-C, and so is what they start
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         assert self.process.stdout is not None
         self.told = ""
