@@ -36,7 +36,7 @@ class Crease(Effect):
     symptom: ClassVar[str] = "unfolds flat in the model where the real one keeps the crease of a sharp fold"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        bending = bending_of(scene.body)
+        bending = bending_of(scene.body, scene.held)
         bending.follow(scene.start_positions)
         rigidity = bending_rigidity(scene.material)
         most = 1.0 / self.values["yield_radius"]

@@ -9,6 +9,7 @@ from ...core.body import Body
 
 #: Share of a hinge's bending that goes to either end of its edge and to either opposite vertex.
 _SHARES = np.array([1 / 3, 1 / 3, 1 / 6, 1 / 6])
+_NONE: IntArray = np.zeros(0, np.int64)
 
 
 class Bending(ABC):
@@ -60,9 +61,9 @@ class Bending(ABC):
         return 1.1 * size
 
 
-def bending_of(body: Body) -> Bending:
-    """The bending of a cloth or a rope, followed to its rest shape."""
-    return RopeBending(body) if body.kind == "rope" else SheetBending(body)
+def bending_of(body: Body, held: IntArray = _NONE) -> Bending:
+    """The bending of a cloth or a rope of which vertices are held, followed to its rest shape."""
+    return RopeBending(body, held) if body.kind == "rope" else SheetBending(body)
 
 
 class SheetBending(Bending):
@@ -121,18 +122,21 @@ class RopeBending(Bending):
     r"""Curvature vectors at the inner vertices of a rope, in frames that do not twist.
 
     The rope turns by the vector :math:`\theta n` at a vertex; over the mean rest length of its two
-    segments that is the curvature. Its two numbers are in a frame that is carried along with the mean tangent by the
-    smallest rotation from state to state, as the time-parallel frames of Bergou et al. The material is thus
-    taken not to spin about the rope's own axis, as in a gripper that does not: where a bent rope is swung
+    segments that is the curvature. A segment that is held at both ends does not bend: beside it all of the turn is
+    that of the other segment's half. The two numbers of a curvature are in a frame that is carried along with the
+    mean tangent by the smallest rotation from state to state, as the time-parallel frames of Bergou et al. The material
+    is thus taken not to spin about the rope's own axis, as in a gripper that does not: where a bent rope is swung
     round like a skipping rope, its bending goes round in the material.
 
     References:
         Bergou, Audoly, Vouga, Wardetzky and Grinspun, *Discrete viscous threads*, 2010.
     """
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: Body, held: IntArray = _NONE) -> None:
         self._lengths = body.measures
-        self.measures = 0.5 * (body.measures[1:] + body.measures[:-1])
+        bends = np.where(np.isin(body.elements, held).all(axis=1), 0.0, body.measures)
+        bends = bends[1:] + bends[:-1]
+        self.measures = 0.5 * np.where(bends > 0, bends, body.measures[1:] + body.measures[:-1])
         tangent = np.diff(body.vertices, axis=0)
         self._tangent = _unit(_unit(tangent)[1:] + _unit(tangent)[:-1])
         least = np.eye(3)[np.abs(self._tangent).argmin(axis=1)]

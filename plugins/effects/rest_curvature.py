@@ -46,7 +46,7 @@ class RestCurvature(Effect):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:
         if not isinstance(scene.material, RopeMaterial):
             return None
-        bending = RopeBending(scene.body)
+        bending = RopeBending(scene.body, scene.held)
         bending.follow(scene.start_positions)
         natural = natural_curvature(bending, scene, masses, scene.material)
         moments = -self.values["share"] * scene.material.bending_rigidity * natural
@@ -62,7 +62,7 @@ def natural_curvature(bending: RopeBending, scene: Scene, masses: FloatArray, ma
     """The smallest ``(V - 2, 2)`` [1/m] that gives the start its acceleration; see :class:`RestCurvature`.
 
     Args:
-        bending: followed to the start.
+        bending: of the rope as it is held, followed to the start.
         scene: where it starts, how it moves and how it is accelerated then; at rest where that is not known.
         masses: of the vertices ``(V,)`` [kg].
         material: whose bending rigidity and damping time count.
@@ -89,12 +89,9 @@ def natural_curvature(bending: RopeBending, scene: Scene, masses: FloatArray, ma
     balanced = right[:rank].T @ ((left[:, :rank].T @ needed) / sizes[:rank])
     one, open_ = balanced[: 2 * places], right[rank:, : 2 * places].T
     weight = np.sqrt(np.repeat(bending.measures, 2))
-    clamped = np.asarray(np.isin(scene.body.elements, scene.held).all(axis=1))
-    # beside a segment that is held at both ends all of the turn is that of the other half
-    share = np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
     moving = np.zeros_like(start) if scene.start_velocities is None else scene.start_velocities
     damped = bending.curvature + material.damping_time * bending.rates(moving)
-    curvature = (share[:, None] * damped).ravel()
+    curvature = damped.ravel()
     ways, extents, _ = np.linalg.svd(weight[:, None] * open_, full_matrices=False)
     ways = ways[:, extents > _RANK * weight.max()]  # what is left open may be tension alone, as of a held segment
     most = (ways @ (ways.T @ (weight * (curvature - one)))) / weight

@@ -42,11 +42,11 @@ class RopeHysteresis(Effect):
         Parameter("sliding_share", "1", 0.0, 0.9, description="s, of the bending rigidity, lost where strands slide"),
         Parameter("slip_curvature", "1/m", 0.0, 2.0, description="change of curvature up to which strands stick"),
     )
-    symptom: ClassVar[str] = "is as stiff in large swings as in small ones in the model, the real one gives way"
+    symptom: ClassVar[str] = "is as stiff in large swings as in small ones in the model where the real one gives way"
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         assert isinstance(scene.material, RopeMaterial)
-        bending = RopeBending(scene.body)
+        bending = RopeBending(scene.body, scene.held)
         bending.follow(scene.start_positions)
         lost = self.values["sliding_share"] * scene.material.bending_rigidity
         most = self.values["slip_curvature"]

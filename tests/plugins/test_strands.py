@@ -104,6 +104,28 @@ def test_a_pendulum_loses_the_same_at_every_swing():
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+def test_a_clamped_rod_whose_strands_slide_at_once_sags_as_a_softer_one(name):
+    """To the clamp, beside which all of the turn is that of half a segment."""
+    simulator, count = engine(name), 11
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), count)
+
+    def sag(rigidity, *effects):
+        material = RopeMaterial(0.05, stretch_stiffness=500.0, bending_rigidity=rigidity, damping_time=0.01)
+        scene = Scene(body, material, np.array([0.0, 0.0, -2.0]), (np.array([0, 1]),), np.zeros(count))
+        world = simulator.open(scene)
+        forces = [e.bind(scene, world.masses) for e in effects]
+        try:
+            for k in range(500):
+                push = -3.0 * world.masses[:, None] * world.state().velocities
+                world.step(body.vertices[:2], sum((f(0.005 * k, world.state()) for f in forces), push))
+            return float(world.state().positions[-1, 2])
+        finally:
+            world.close()
+
+    assert sag(0.01, RopeHysteresis(sliding_share=0.5)) == pytest.approx(sag(0.005), rel=0.005)
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
 def test_a_rod_that_was_bent_swings_out_and_stays_a_little_bent(name):
     """Clamped, without weight, let go from an arc: with strands that slide it rests off straight, within their band.
 
