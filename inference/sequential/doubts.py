@@ -1,25 +1,35 @@
 """What makes the numbers of a fit doubtful, found out with a few more rollouts."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import SimulationPool, Task
 from ..noise import Noise
-from ..roughness import roughness, unrepeatable
+from ..roughness import Roughness, roughness, unrepeatable
+
+#: A step that moves the model by more than this is told of [noise standard deviations].
+STEP_MATTERS = 1.0
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
     """Sentences for people; empty if nothing is doubtful.
 
     What a rollout does by chance tells nothing of the parameters. A motion that is rough at the frame rate passes for
-    noise where the noise is estimated from roughness.
+    noise where the noise is estimated from roughness. What the time step does passes for the material's doing.
     """
     problem = pool.problem
     values = space.as_dict(space.from_unit(unit))
-    plain = next(iter(pool.map([Task(values, problem.fit_on[0])])))
-    if not isinstance(plain, Trajectory):
-        return [f"the best fit cannot be simulated: {plain.reason}"]
+    plain: dict[str, Trajectory] = {}
+    for name, outcome in zip(problem.fit_on, pool.map([Task(values, n) for n in problem.fit_on]), strict=True):
+        if not isinstance(outcome, Trajectory):
+            return [f"the best fit cannot be simulated: {outcome.reason}"]
+        plain[name] = outcome
     out: list[str] = []
     rough = roughness(pool, space, unit, problem.fit_on)
     if failing := [n for n in problem.fit_on if n not in rough.sd]:
@@ -31,11 +41,45 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             + "; what it does there is chance and does not count. Where chance does not decide in reality, "
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
         )
+    out += step_matters(pool, values, plain, rough, noise)
     if noise.source.startswith("roughness"):
-        own = robust_sd(fourth_differences(plain.series.points))
+        own = robust_sd(fourth_differences(plain[problem.fit_on[0]].series.points))
         if own > 0.5 * noise.sd:
             out.append(
                 "the motion is fast for the frame rate and passes for noise, which is overestimated; "
                 f"give it: [noise] sd = ... in {'metres' if noise.unit == 'm' else 'pixels'}, or record repeats"
             )
     return out
+
+
+def step_matters(
+    pool: SimulationPool, values: dict[str, float], plain: Mapping[str, Trajectory], rough: Roughness, noise: Noise
+) -> list[str]:
+    """What half the time step changes, in a sentence, where that is more than the noise.
+
+    Frames that chance decides are left out: there a smaller step would be another throw of the dice.
+
+    Args:
+        pool, values: of the model with its own step, and where it fits best.
+        plain: what it predicts there, by recording.
+        rough: what it cannot repeat there.
+        noise: of the measurement.
+    """
+    finer = pool.problem.simulator.finer()
+    if finer is None:
+        return []
+    with SimulationPool(replace(pool.problem, simulator=finer), min(1, pool.workers)) as other:
+        outcomes = dict(zip(plain, other.map([Task(values, name) for name in plain]), strict=True))
+    squares = []
+    for name, outcome in outcomes.items():
+        if isinstance(outcome, Trajectory) and name in rough.sd:
+            moved = outcome.series.points - plain[name].series.points
+            squares.append(moved[rough.sd[name] <= noise.sd].ravel() ** 2)
+    changed = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
+    if not changed > STEP_MATTERS * noise.sd:
+        return []
+    size = f"{1e3 * changed:.2g} mm" if noise.unit == "m" else f"{changed:.2g} px"
+    return [
+        f"half the time step moves the model by {size}, {changed / noise.sd:.2g} times the noise: what the step does "
+        "passes for the material's doing or for a misfit; lower [simulator] time_step until that no longer counts"
+    ]

@@ -1,0 +1,27 @@
+"""What makes a fit doubtful is said."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from buckling import buckling_study
+
+from muslin.core.registry import REGISTRY
+from muslin.core.study import SimulationPool
+from muslin.inference.noise import Noise
+from muslin.inference.sequential.doubts import doubts
+
+
+def test_a_time_step_that_moves_a_swung_rope_by_more_than_the_noise_is_told(tmp_path: Path) -> None:
+    problem = replace(buckling_study(tmp_path).problem, fit_on=("up",))
+    middle = np.full(len(problem.space), 0.5)
+
+    def said(time_step: float, noise: float) -> list[str]:
+        stepped = replace(problem, simulator=REGISTRY.get("simulator", "mujoco")(time_step=time_step))
+        with SimulationPool(stepped, 0) as pool:
+            return doubts(pool, problem.space, middle, Noise(noise, 0.0, "test", "m", 0.01))
+
+    (coarse,) = said(0.01, 0.001)
+    assert "half the time step moves the model by 3.9 mm, 3.9 times the noise" in coarse
+    assert not said(0.001, 0.001)
+    assert not said(0.01, 0.005)
