@@ -27,6 +27,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
     parts = {
         "verdict": _verdict(result, effects),
         "further": _further(result),
+        "rest": _rest(result),
         "budget": _budget(result),
         "elsewhere": _elsewhere(result),
         "where": _where(result),
@@ -98,6 +99,19 @@ def _further(result: dict[str, Any]) -> str:
     return (
         f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(further)}; these data "
         "cannot tell which."
+    )
+
+
+def _rest(result: dict[str, Any]) -> str:
+    """That something is left beside what was named is no reason to doubt the name, but to go on."""
+    if result["rest"] is None:
+        return ""
+    left = f"{result['evidence']['misfit_after'] ** 0.5:.2f} times the noise"
+    if result["rest"] == "none":
+        return f"More is missing: the fitted recordings are still {left} off, and no further candidate explains that."
+    return (
+        f"More may be missing: the fitted recordings are still {left} off, and the budget ended after "
+        f"{result['simulations']} simulations, before that was looked into; allow more ([diagnose] simulations)."
     )
 
 

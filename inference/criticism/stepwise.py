@@ -6,7 +6,7 @@ from ...core.arrays import FloatArray
 from .candidate import Candidate
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import MARGIN, SHARE_LEFT, SIGNIFICANT, Verdict
+from .verdict import MARGIN, SHARE_LEFT, SIGNIFICANT, Decision, Verdict
 from .work import Work
 
 #: Effects that one diagnosis may name.
@@ -28,6 +28,7 @@ class Findings:
         last: the stage that the verdict comes from.
         after: the model with what was named; where nothing was, the candidate that came nearest.
         further: effects beside the named ones of which one is missing, too, and which is not to be told.
+        rest: what was decided with the named ones in the model; None where that was not looked into.
     """
 
     verdict: Verdict
@@ -36,6 +37,7 @@ class Findings:
     last: Stage
     after: Candidate
     further: tuple[str, ...] = ()
+    rest: Decision | None = None
 
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
@@ -63,13 +65,14 @@ def _forward(work: Work, names: list[str], found: Findings) -> Findings:
             break
         stage = settled(work, run_stage(work, found.effects, rest, found.after.fit.unit))
         # the same model, fitted to the end, and its numerics looked at where it fits
-        found = replace(found, after=work.judged(replace(found.after, fit=stage.plain)))
+        after = work.judged(replace(found.after, fit=stage.plain))
+        found = replace(found, after=after, rest=stage.decision)
         if stage.decision.verdict == "tied":
             return replace(found, further=stage.decision.effects)
         if stage.decision.verdict != "named":
             break
         effects = (*found.effects, stage.chosen.name)
-        found = _without_idle(work, replace(found, effects=effects, last=stage, after=stage.chosen))
+        found = _without_idle(work, replace(found, effects=effects, last=stage, after=stage.chosen, rest=None))
         if len(found.effects) < len(effects):
             break  # one was dropped again: from here it would go in circles
     return found

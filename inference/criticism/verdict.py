@@ -25,6 +25,8 @@ SHARE_LEFT = 0.5
 HELD_OUT_SHARE = 0.2
 #: ... where there is more of it than this share of the noise variance.
 HELD_OUT_SLACK = 0.02
+#: That nothing is missing is said only if these data would show this share of the candidates.
+MOST_VISIBLE = 2 / 3
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def decide(e: Evidence) -> Decision:
     passing = sorted((c for c in e.candidates if objection(e, c) is None), key=lambda c: c.rank)
     if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
         seen = sum(c.visible for c in e.candidates)
-        return Decision("no-misfit" if 2 * seen >= len(e.candidates) else "cannot-tell", ())
+        return Decision("no-misfit" if seen >= MOST_VISIBLE * len(e.candidates) else "cannot-tell", ())
     if not any(c.refitted for c in (passing[:1] or e.candidates)):  # nothing is named nor ruled out unfitted
         return Decision("cannot-tell", (), unfinished=True)
     if not passing:

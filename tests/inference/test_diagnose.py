@@ -16,8 +16,8 @@ from muslin.plugins.effects.command import ActuatorLag
 pytest.importorskip("mujoco")
 
 SCHEMA = {
-    "verdict", "effects", "further", "candidates", "error", "evidence", "unrepeatable", "where", "told", "simulations",
-    "budget_spent", "unfinished", "seconds", "seed",
+    "verdict", "effects", "further", "rest", "candidates", "error", "evidence", "unrepeatable", "where", "told",
+    "simulations", "budget_spent", "unfinished", "seconds", "seed",
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
@@ -68,6 +68,7 @@ def test_two_effects_at_once_are_both_named(tmp_path: Path) -> None:
     result = study.diagnose().result
     assert result["verdict"] == "named"
     assert set(result["effects"]) == {"air-drag", "actuator-lag"}
+    assert result["rest"] is None
     assert result["error"]["after"] < 1.2 * result["error"]["noise"]
 
 

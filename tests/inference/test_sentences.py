@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from muslin.inference.criticism.sentences import _elsewhere
+from muslin.inference.criticism.sentences import _elsewhere, _rest
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -25,3 +25,12 @@ def test_nothing_is_told_where_there_is_nothing() -> None:
     assert not _elsewhere(result("no-misfit", 2.0, held_out=False))
     assert not _elsewhere(result("named", 2.0))
     assert not _elsewhere(result("cannot-tell", 2.0) | {"unfinished": True})
+
+
+def test_a_misfit_that_stays_beside_what_was_named_is_told() -> None:
+    named = {"evidence": {"misfit_after": 1.5**2}, "simulations": 900}
+    assert not _rest(named | {"rest": None})
+    told = _rest(named | {"rest": "none"})
+    assert told.startswith("More is missing") and "1.50 times the noise" in told
+    told = _rest(named | {"rest": "unfinished"})
+    assert told.startswith("More may be missing") and "900 simulations" in told and "[diagnose] simulations" in told

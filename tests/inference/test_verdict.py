@@ -84,6 +84,8 @@ def test_no_misfit_and_cannot_tell_differ_in_what_the_data_could_show() -> None:
     seen, unseen = candidate("drag", COUNT - 1), candidate("lag", COUNT - 1, sd=0.3)
     assert decide(evidence(1.01 * COUNT, seen, seen)).verdict == "no-misfit"
     assert decide(evidence(1.01 * COUNT, unseen, unseen)).verdict == "cannot-tell"
+    assert decide(evidence(1.01 * COUNT, seen, seen, unseen)).verdict == "no-misfit"
+    assert decide(evidence(1.01 * COUNT, seen, unseen)).verdict == "cannot-tell"
 
 
 def test_a_small_but_certain_effect_is_named() -> None:
