@@ -74,7 +74,7 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
         return (
             f"The model misses something, but none of the candidates is it: the misfit is {ratio:.1f} times the noise, "
             f"and the best candidate, {best['name']}, explains {100 * best['explained']:.0f} % of the excess: "
-            f"{_reason(best, result)}."
+            f"{_reason(best, result)}.{_in_part(best, error['unit'])}"
         )
     if verdict == "no-misfit":
         return (
@@ -89,6 +89,17 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
         )
     return (
         "Cannot tell: the model fits, but these data would fit as well if an effect of ordinary strength were missing."
+    )
+
+
+def _in_part(best: dict[str, Any], unit: str) -> str:
+    """What a candidate is good for that is not the answer, where motions that it was not fitted to get better by it."""
+    before, after = best["held_out_before"], best["held_out_after"]
+    if best["explained"] < _WORTH_TELLING or before is None or not after < before:
+        return ""
+    return (
+        f" It is a part of the answer at most: with it the held-out error goes {length(before, unit)} → "
+        f"{length(after, unit)}."
     )
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from muslin.inference.criticism.sentences import _elsewhere, _rest
+from muslin.inference.criticism.sentences import _elsewhere, _in_part, _rest
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -34,3 +34,10 @@ def test_a_misfit_that_stays_beside_what_was_named_is_told() -> None:
     assert told.startswith("More is missing") and "1.50 times the noise" in told
     told = _rest(named | {"rest": "unfinished"})
     assert told.startswith("More may be missing") and "900 simulations" in told and "[diagnose] simulations" in told
+
+
+def test_a_candidate_that_is_a_part_of_the_answer_is_told_with_what_it_is_good_for() -> None:
+    part = {"explained": 0.36, "held_out_before": 0.0083, "held_out_after": 0.0065}
+    assert "8.3 mm → 6.5 mm" in _in_part(part, "m")
+    for less in ({"explained": 0.1}, {"held_out_after": 0.0084}, {"held_out_before": None, "held_out_after": None}):
+        assert not _in_part(part | less, "m")
