@@ -156,6 +156,7 @@ def _result(
             "explained": joint.explained(after),
             "numerics": joint.nearest.numerics / joint.excess,
         },
+        "numerics": work.moved,
         "unrepeatable": unrepeatable(work.rough, problem.recordings, work.fit.noise),
         "where": where_it_is(pair, problem.recordings) if changed else None,
         "simulations": count,

@@ -2,7 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,10 +23,24 @@ from ..residuals import Offsets, residual
 _STEP, _MESH = 2.0, 4.0 / 3.0
 
 
-def numerical_directions(
-    pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets
-) -> tuple[dict[str, FloatArray], int]:
-    """What the numbers of the pool's problem may be off by at ``values``, and the rollouts elsewhere that it took.
+@dataclass(frozen=True, eq=False)
+class Numerics:
+    """What the numbers of a model may be off by.
+
+    Args:
+        directions: of the white residuals, ``(N_r, K)`` by recording.
+        moved: how far the fitted recordings go from what the model predicts, root mean square a coordinate, by what
+            was changed: ``"step"`` (half of it), ``"mesh"`` (finer), or the name of another engine [m or px].
+        cost: rollouts elsewhere that it took.
+    """
+
+    directions: dict[str, FloatArray] = field(default_factory=dict)
+    moved: dict[str, float] = field(default_factory=dict)
+    cost: int = 0
+
+
+def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets) -> Numerics:
+    """Simulate the pool's problem at ``values`` with a finer step, on a finer mesh, and on every other engine.
 
     Each direction comes twice, constant and growing over the recording, as errors of a rollout do. Directions that
     cannot be had (no other engine is there, or it cannot do this) are left out.
@@ -34,30 +48,35 @@ def numerical_directions(
     problem = pool.problem
     names = (*problem.fit_on, *problem.hold_out)
     used = [problem.effects[e] for e in {n.split(".", 1)[0] for n in values if "." in n}]
-    variants: list[tuple[Problem, float, int]] = []  # how much its change counts, and on how many processes
+    variants: dict[str, tuple[Problem, float, int]] = {}  # how much its change counts, and on how many processes
     finer = problem.simulator.finer()
     if finer is not None:
-        variants.append((replace(problem, simulator=finer), _STEP, 1))
+        variants["step"] = replace(problem, simulator=finer), _STEP, 1
     meshes = {n: refined(problem.scenarios[n]) for n in names}
     if all(s is not None for s in meshes.values()):
         whole = {n: s for n, s in meshes.items() if s is not None}
-        variants.append((replace(problem, scenarios={**problem.scenarios, **whole}), _MESH, pool.workers))
+        variants["mesh"] = replace(problem, scenarios={**problem.scenarios, **whole}), _MESH, pool.workers
     for simulator in _others(problem.simulator):
         scenario = problem.scenarios[names[0]]
         if not any(why_powerless(effect, simulator, scenario) for effect in used):
-            variants.append((replace(problem, simulator=simulator), 1.0, 1))
+            variants[simulator.name] = replace(problem, simulator=simulator), 1.0, 1
     as_it_is = _predicted(pool, values, names)
     columns: dict[str, list[FloatArray]] = {n: [] for n in names}
     with ExitStack() as stack:  # an interruption ends the processes first, then the threads that wait for them
         threads = stack.enter_context(ThreadPoolExecutor(max(1, pool.workers)))
         # a few rollouts each: but on the finer mesh, starting more than one process would take longer
-        pools = [stack.enter_context(SimulationPool(v, min(most, pool.workers))) for v, _, most in variants]
+        pools = [stack.enter_context(SimulationPool(v, min(most, pool.workers))) for v, _, most in variants.values()]
         others = list(threads.map(lambda elsewhere: _predicted(elsewhere, values, names), pools))
         cost = sum(elsewhere.count for elsewhere in pools)
-    for (_, size, _), made in zip(variants, others, strict=True):
+    moved = {}
+    for (what, (_, size, _)), made in zip(variants.items(), others, strict=True):
         for name in made.keys() & as_it_is.keys():
             columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
-    return {n: np.stack(c, axis=1) for n, c in columns.items() if c}, cost
+        pairs = [(as_it_is[n].points, made[n].points) for n in problem.fit_on if n in made.keys() & as_it_is.keys()]
+        apart = [((a - b) ** 2).ravel() for a, b in pairs if a.shape == b.shape]
+        if apart:
+            moved[what] = float(np.sqrt(np.nanmean(np.concatenate(apart))))
+    return Numerics({n: np.stack(c, axis=1) for n, c in columns.items() if c}, moved, cost)
 
 
 def _others(simulator: Simulator) -> list[Simulator]:

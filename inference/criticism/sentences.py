@@ -2,18 +2,15 @@
 
 from typing import Any
 
-import numpy as np
-
 from ...core.effect import Effect
 from ...core.study import Study
+from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable
 from .verdict import EXPLAINS
 
 #: Candidates that explain at least this share are told one by one.
 _WORTH_TELLING = 0.2
 #: A coefficient known to this part of its size needs no better experiment.
 _KNOWN = 0.1
-#: A held-out error of so many times the noise is told where the fitted recordings show no misfit.
-_ELSEWHERE = 1.5
 
 
 def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]]) -> dict[str, str]:
@@ -26,14 +23,15 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
     """
     parts = {
         "verdict": _verdict(result, effects),
-        "further": _further(result),
-        "rest": _rest(result),
-        "budget": _budget(result),
-        "elsewhere": _elsewhere(result),
+        "further": further(result),
+        "rest": rest(result),
+        "budget": budget(result),
+        "elsewhere": elsewhere(result),
         "where": _where(result),
-        "unrepeatable": _unrepeatable(result),
+        "numerics": numerics(result),
+        "unrepeatable": unrepeatable(result),
         "alternatives": _alternatives(result),
-        "invisible": _invisible(result),
+        "invisible": invisible(result),
         "to_be_sure": _to_be_sure(study, result),
     }
     return {key: text for key, text in parts.items() if text}
@@ -103,54 +101,6 @@ def _in_part(best: dict[str, Any], unit: str) -> str:
     )
 
 
-def _further(result: dict[str, Any]) -> str:
-    further = result["further"]
-    if not further:
-        return ""
-    return (
-        f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(further)}; these data "
-        "cannot tell which."
-    )
-
-
-def _rest(result: dict[str, Any]) -> str:
-    """That something is left beside what was named is no reason to doubt the name, but to go on."""
-    if result["rest"] is None:
-        return ""
-    left = f"{result['evidence']['misfit_after'] ** 0.5:.2f} times the noise"
-    if result["rest"] == "none":
-        return f"More is missing: the fitted recordings are still {left} off, and no further candidate explains that."
-    return (
-        f"More may be missing: the fitted recordings are still {left} off, and the budget ended after "
-        f"{result['simulations']} simulations, before that was looked into; allow more ([diagnose] simulations)."
-    )
-
-
-def _elsewhere(result: dict[str, Any]) -> str:
-    """What a fit without a misfit still does not say: how the model does on other motions."""
-    error = result["error"]
-    if result["verdict"] not in ("no-misfit", "cannot-tell") or result["unfinished"] or not error["held_out"]:
-        return ""
-    ratio = result["evidence"]["held_out"] ** 0.5
-    if np.isnan(ratio) or ratio < _ELSEWHERE:
-        return ""
-    if np.isinf(ratio):
-        return "But held-out motions cannot be simulated with what was fitted, so nothing is said of them."
-    return (
-        f"But on held-out motions the model is {ratio:.1f} times the noise off, beyond what its numerics and chance "
-        "explain: what is missing shows there. Fit on one of them too ([study] fit_on), and diagnose again."
-    )
-
-
-def _budget(result: dict[str, Any]) -> str:
-    if not result["budget_spent"] or result["verdict"] not in ("none", "tied"):
-        return ""
-    return (
-        f"The budget cut the search short, after {result['simulations']} simulations: with more of them "
-        "([diagnose] simulations) a candidate may come nearer."
-    )
-
-
 def _where(result: dict[str, Any]) -> str:
     where = result["where"]
     if where is None:
@@ -160,14 +110,6 @@ def _where(result: dict[str, Any]) -> str:
         f"Where: {100 * where['share']:.0f} % of the error that goes is in {where['recording']}, most of it from "
         f"{where['from']:.2f} to {where['to']:.2f} s{point}."
     )
-
-
-def _unrepeatable(result: dict[str, Any]) -> str:
-    loose = result["unrepeatable"]
-    if not loose:
-        return ""
-    where = "; ".join(loose)
-    return f"Left to chance: next to nothing in the parameters moves {where}; what is measured there does not count."
 
 
 def _alternatives(result: dict[str, Any]) -> str:
@@ -203,11 +145,6 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
     return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
 
 
-def _invisible(result: dict[str, Any]) -> str:
-    hidden = sorted(c["name"] for c in result["candidates"] if c["identifiability"] == 0.0)
-    return f"Not visible in these data, so neither ruled in nor out: {', '.join(hidden)}." if hidden else ""
-
-
 def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
     verdict = result["verdict"]
     if verdict == "tied":
@@ -237,11 +174,6 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
         if vague:
             return f"Still vague: {', '.join(vague)} (known to no better than a tenth of its size)."
     return ""
-
-
-def length(value: float, unit: str) -> str:
-    """A length for people: millimetres for metres."""
-    return f"{1e3 * value:.1f} mm" if unit == "m" else f"{value:.2f} {unit}"
 
 
 def _coefficients(candidate: dict[str, Any]) -> str:

@@ -16,7 +16,7 @@ from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
 from .candidate import Candidate, root_mean_square
 from .held_out import held_out_residuals
-from .numerics import numerical_directions
+from .numerics import numerics
 from .verdict import Evidence
 
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
@@ -32,6 +32,7 @@ class Work:
     Attributes:
         discrepancy: how far the model's own numbers may be off, as last seen.
         rough: what it cannot repeat, as last seen.
+        moved: how far its own numbers move the model as it is, see :class:`~.numerics.Numerics`.
         limit: of rollouts.
         cut_short: whether something was left out for want of them.
     """
@@ -44,6 +45,7 @@ class Work:
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})
+        self.moved: dict[str, float] = {}
         self._elsewhere = 0  # rollouts of other engines and meshes
         self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
 
@@ -71,12 +73,16 @@ class Work:
         """Look at the model's own errors where it fits best so far, and at what it cannot repeat there."""
         space = self.space(effects)
         values = space.as_dict(space.from_unit(unit))
-        directions, cost = numerical_directions(self.pool, values, self.fit.noise, self.offsets)
+        found = numerics(self.pool, values, self.fit.noise, self.offsets)
         names = (*self.problem.fit_on, *self.problem.hold_out)
         self.rough = roughness(self.pool, space, unit, names)
-        self.discrepancy = self.rough.discrepancy(self.problem.recordings, self.fit.noise, self.offsets, directions)
+        self.discrepancy = self.rough.discrepancy(
+            self.problem.recordings, self.fit.noise, self.offsets, found.directions
+        )
         check_repeatable(self.discrepancy, self.problem.fit_on)
-        self._elsewhere += cost
+        self._elsewhere += found.cost
+        if not effects:
+            self.moved = found.moved
 
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """A least-squares fit of the model with ``effects``, of as many evaluations as the budget has left."""

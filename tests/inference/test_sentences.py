@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from muslin.inference.criticism.sentences import _elsewhere, _in_part, _rest
+from muslin.inference.criticism.caveats import elsewhere, numerics, rest
+from muslin.inference.criticism.sentences import _in_part
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -14,25 +15,25 @@ def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
 
 @pytest.mark.parametrize("verdict", ["no-misfit", "cannot-tell"])
 def test_a_misfit_that_only_held_out_motions_show_is_told(verdict: str) -> None:
-    text = _elsewhere(result(verdict, 2.0))
+    text = elsewhere(result(verdict, 2.0))
     assert "2.0 times the noise" in text and "fit_on" in text
-    assert "cannot be simulated" in _elsewhere(result(verdict, float("inf")))
+    assert "cannot be simulated" in elsewhere(result(verdict, float("inf")))
 
 
 def test_nothing_is_told_where_there_is_nothing() -> None:
-    assert not _elsewhere(result("no-misfit", 1.1))
-    assert not _elsewhere(result("no-misfit", float("nan")))
-    assert not _elsewhere(result("no-misfit", 2.0, held_out=False))
-    assert not _elsewhere(result("named", 2.0))
-    assert not _elsewhere(result("cannot-tell", 2.0) | {"unfinished": True})
+    assert not elsewhere(result("no-misfit", 1.1))
+    assert not elsewhere(result("no-misfit", float("nan")))
+    assert not elsewhere(result("no-misfit", 2.0, held_out=False))
+    assert not elsewhere(result("named", 2.0))
+    assert not elsewhere(result("cannot-tell", 2.0) | {"unfinished": True})
 
 
 def test_a_misfit_that_stays_beside_what_was_named_is_told() -> None:
     named = {"evidence": {"misfit_after": 1.5**2}, "simulations": 900}
-    assert not _rest(named | {"rest": None})
-    told = _rest(named | {"rest": "none"})
+    assert not rest(named | {"rest": None})
+    told = rest(named | {"rest": "none"})
     assert told.startswith("More is missing") and "1.50 times the noise" in told
-    told = _rest(named | {"rest": "unfinished"})
+    told = rest(named | {"rest": "unfinished"})
     assert told.startswith("More may be missing") and "900 simulations" in told and "[diagnose] simulations" in told
 
 
@@ -41,3 +42,14 @@ def test_a_candidate_that_is_a_part_of_the_answer_is_told_with_what_it_is_good_f
     assert "8.3 mm → 6.5 mm" in _in_part(part, "m")
     for less in ({"explained": 0.1}, {"held_out_after": 0.0084}, {"held_out_before": None, "held_out_after": None}):
         assert not _in_part(part | less, "m")
+
+
+def test_numbers_that_move_the_model_are_told_where_a_misfit_stays() -> None:
+    known = {"error": {"noise": 0.002, "unit": "m"}, "rest": None}
+    moved = {"numerics": {"step": 0.012, "mesh": 0.001, "pybullet": 0.018}}
+    told = numerics(known | moved | {"verdict": "none"})
+    assert "half the time step by 12.0 mm, the engine pybullet by 18.0 mm" in told and "mesh" not in told
+    assert "Lower [simulator] time_step until" in told
+    assert numerics(known | moved | {"verdict": "named", "rest": "none"}) == told
+    assert not numerics(known | moved | {"verdict": "named"})
+    assert not numerics(known | {"numerics": {"step": 0.001}, "verdict": "none"})
