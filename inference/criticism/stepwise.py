@@ -14,7 +14,7 @@ MOST_EFFECTS = 3
 #: Where no effect alone is enough, pairs are tried with this many that explain at least this share of the misfit.
 LEADS, LEADING = 2, 0.2
 #: Share of the budget that the first stage may use.
-FIRST_SHARE = 2 / 3
+FIRST_SHARE = 3 / 4
 
 
 @dataclass(frozen=True, eq=False)

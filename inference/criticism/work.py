@@ -19,6 +19,8 @@ from .held_out import held_out_residuals
 from .numerics import numerics
 from .verdict import Evidence
 
+#: Share of the simulations that the search leaves: for what it has begun when they end, and for telling what it found.
+RESERVED = 0.15
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 
@@ -41,7 +43,7 @@ class Work:
         self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-        self.limit = study.config.diagnose.simulations
+        self.limit = int((1 - RESERVED) * study.config.diagnose.simulations)
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})
