@@ -30,7 +30,8 @@ TITLES = ("set", "fitted on", "held out", *COLUMNS, "verdict", "rollouts", "seco
 def absolute(problem: Problem, values: Mapping[str, float], effects: list[str]) -> dict[str, float]:
     """Errors [m] on the held-out takes of ``problem``: of a point, the median; of a coordinate, the mean absolute one.
 
-    ``median_take`` is the median over takes of the latter, ``failed`` how many takes could not be simulated.
+    ``median_take`` is the median over takes of the latter, ``failed`` how many takes could not be simulated; NaN where
+    none could.
     """
     problem = replace(problem, effects={n: REGISTRY.get("effect", n) for n in effects})
     off, failed = [], 0
@@ -42,6 +43,8 @@ def absolute(problem: Problem, values: Mapping[str, float], effects: list[str]) 
             continue
         difference = simulated - problem.recordings[name].series.points
         off.append(difference[np.isfinite(difference).all(axis=2)])
+    if not off:
+        return {"takes": 0, "failed": failed} | dict.fromkeys(("median_point", "mean_coordinate", "median_take"), np.nan)
     every = np.concatenate(off)
     return {
         "takes": len(off),
