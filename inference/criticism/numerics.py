@@ -20,7 +20,7 @@ from ..residuals import Offsets, residual
 
 #: How much larger the whole error is than what a step or spacing of half the size takes away: first-order methods
 #: still have as much before them, second-order ones a third.
-_STEP, _MESH = 2.0, 4.0 / 3.0
+STEP_ERROR, _MESH = 2.0, 4.0 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +42,8 @@ class Numerics:
 def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets) -> Numerics:
     """Simulate the pool's problem at ``values`` with a finer step, on a finer mesh, and on every other engine.
 
-    Each direction comes twice, constant and growing over the recording, as errors of a rollout do. Directions that
-    cannot be had (no other engine is there, or it cannot do this) are left out.
+    Each direction comes twice, see :func:`changes`. Directions that cannot be had (no other engine is there, or it
+    cannot do this) are left out.
     """
     problem = pool.problem
     names = (*problem.fit_on, *problem.hold_out)
@@ -51,7 +51,7 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
     variants: dict[str, tuple[Problem, float, int]] = {}  # how much its change counts, and on how many processes
     finer = problem.simulator.finer()
     if finer is not None:
-        variants["step"] = replace(problem, simulator=finer), _STEP, 1
+        variants["step"] = replace(problem, simulator=finer), STEP_ERROR, 1
     meshes = {n: refined(problem.scenarios[n]) for n in names}
     if all(s is not None for s in meshes.values()):
         whole = {n: s for n, s in meshes.items() if s is not None}
@@ -77,6 +77,12 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
         if apart:
             moved[what] = float(np.sqrt(np.nanmean(np.concatenate(apart))))
     return Numerics({n: np.stack(c, axis=1) for n, c in columns.items() if c}, moved, cost)
+
+
+def changes(base: FloatArray, other: FloatArray) -> list[FloatArray]:
+    """From points ``(T, P, A)`` to others, constant and growing over the recording, as errors of a rollout do."""
+    later = np.linspace(-1.0, 1.0, len(base))[:, None, None]
+    return [other - base, later * (other - base)]
 
 
 def _others(simulator: Simulator) -> list[Simulator]:
@@ -108,10 +114,9 @@ def _columns(
     if base.points.shape != other.points.shape:
         return []
     white = residual(recording, base, noise, offsets).white
-    later = np.linspace(0.0, 1.0, len(base.time))[:, None, None]
     out = []
-    for share in (1.0, 2.0 * later - 1.0):
-        moved = replace(base, points=base.points + share * (other.points - base.points))
+    for change in changes(base.points, other.points):
+        moved = replace(base, points=base.points + change)
         column = size * (residual(recording, moved, noise, offsets).white - white)
         if np.isfinite(column).all():
             out.append(column)

@@ -44,7 +44,9 @@ def absolute(problem: Problem, values: Mapping[str, float], effects: list[str]) 
         difference = simulated - problem.recordings[name].series.points
         off.append(difference[np.isfinite(difference).all(axis=2)])
     if not off:
-        return {"takes": 0, "failed": failed} | dict.fromkeys(("median_point", "mean_coordinate", "median_take"), np.nan)
+        return {"takes": 0, "failed": failed} | dict.fromkeys(
+            ("median_point", "mean_coordinate", "median_take"), np.nan
+        )
     every = np.concatenate(off)
     return {
         "takes": len(off),

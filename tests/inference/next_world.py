@@ -75,10 +75,19 @@ class Fragile(ReferenceSimulator):
         return world
 
 
+class Stepped(ReferenceSimulator):
+    """Knows that a smaller step would do better, as the engines do."""
+
+    name: ClassVar[str] = "stepped"
+
+    def finer(self) -> "Stepped":
+        return type(self)(time_step=self.time_step / 2)
+
+
 def register(monkeypatch: pytest.MonkeyPatch) -> None:
     for effect in (LinearDrag, TwinDrag, QuadraticDrag):
         monkeypatch.setitem(REGISTRY._objects, ("effect", effect.name), effect)
-    for simulator in (ReferenceSimulator, Fragile):
+    for simulator in (ReferenceSimulator, Fragile, Stepped):
         monkeypatch.setitem(REGISTRY._objects, ("simulator", simulator.name), simulator)
 
 

@@ -176,6 +176,16 @@ def test_noise_hides(tmp_path: Path) -> None:
     assert shares[0] > shares[1] + 0.3
 
 
+def test_the_error_of_a_time_step_hides(tmp_path: Path) -> None:
+    """Of one motion, recorded once more, less can be told by a model whose step is known to be off."""
+    told = []
+    for simulator in ("reference", "stepped"):
+        study = rope_study(_folder(tmp_path / simulator), simulator=simulator, noise=0.2 * NOISE)
+        tied_drags(study)
+        told.append(propose(study, max_speed=1.0, max_acceleration=10.0).result["repeat"]["probability"])
+    assert told[0] > told[1] + 0.1
+
+
 def _folder(path: Path) -> Path:
     path.mkdir()
     return path

@@ -1,4 +1,4 @@
-"""Where proposed motions are simulated: every model, and every direction that its posterior leaves open."""
+"""Where proposed motions are simulated: every model, every direction that its posterior leaves open, a finer step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -12,6 +12,7 @@ from ....core.scenario import Scenario
 from ....core.study import Problem, Study, Task
 from ...noise import Noise
 from ...residuals import Offsets
+from ..numerics import STEP_ERROR, changes
 from .rivals import Rival
 from .shapes import Shape
 from .telling import View
@@ -72,8 +73,14 @@ class Bench:
 
     @property
     def cost_of_views(self) -> int:
-        """Further rollouts for what their posteriors leave open."""
-        return sum(len(m.unit) for m in (self.models[:1] if self.shared else self.models))
+        """Further rollouts for what their posteriors and their time step leave open."""
+        finer = self.problem.simulator.finer() is not None
+        return sum(len(m.unit) + finer for m in self._seen)
+
+    @property
+    def _seen(self) -> list[Rival]:
+        """The models whose sensitivities are simulated."""
+        return self.models[:1] if self.shared else self.models
 
     def predict(self, proposals: Sequence[Proposal]) -> None:
         """Fill in the points of all."""
@@ -88,14 +95,15 @@ class Bench:
     def look(self, proposals: Sequence[Proposal]) -> None:
         """Fill in the views of all that can be simulated."""
         able = [p for p in proposals if p.points is not None and not p.failed]
-        moved = [m.steps() for m in (self.models[:1] if self.shared else self.models)]
+        moved = [m.steps() for m in self._seen]
         jobs = [
             (k, m.values(u))
             for k in range(len(able))
-            for m, (units, _) in zip(self.models, moved, strict=False)
+            for m, (units, _) in zip(self._seen, moved, strict=True)
             for u in units
         ]
         outcomes = iter(self._run(able, jobs, "simulating what the parameters change"))
+        finer = iter(self._with_a_finer_step(able))
         for proposal in able:
             assert proposal.points is not None
             spreads = []
@@ -103,6 +111,9 @@ class Bench:
                 ends = [next(outcomes) for _ in units]
                 proposal.failed |= any(e is None for e in ends)
                 columns = [w * (e - base).ravel() for e, w in zip(ends, weights, strict=True) if e is not None]
+                columns += [
+                    STEP_ERROR * c.ravel() for end in (next(finer),) if end is not None for c in changes(base, end)
+                ]
                 spreads.append(self._white(np.column_stack([*columns, self._offsets(base)])))
             if proposal.failed:
                 continue
@@ -110,8 +121,20 @@ class Bench:
                 spreads = spreads * len(self.models)
             proposal.views = [View(self._white(p.ravel()), s) for p, s in zip(proposal.points, spreads, strict=True)]
 
+    def _with_a_finer_step(self, proposals: Sequence[Proposal]) -> list[FloatArray | None]:
+        """What every model whose sensitivities are simulated predicts with half its time step, by proposal."""
+        finer = self.problem.simulator.finer()
+        jobs = [(k, m.values()) for k in range(len(proposals)) for m in self._seen]
+        if finer is None:
+            return [None] * len(jobs)
+        return self._run(proposals, jobs, "simulating smaller steps", replace(self.problem, simulator=finer))
+
     def _run(
-        self, proposals: Sequence[Proposal], jobs: list[tuple[int, dict[str, float]]], title: str
+        self,
+        proposals: Sequence[Proposal],
+        jobs: list[tuple[int, dict[str, float]]],
+        title: str,
+        problem: Problem | None = None,
     ) -> list[FloatArray | None]:
         """Points ``(T, P, A)`` of every job, None where it failed."""
         if not jobs:
@@ -120,7 +143,7 @@ class Bench:
         scenarios = {
             n: replace(self.scenario, motion=p.motion, times=self.times) for n, p in zip(names, proposals, strict=True)
         }
-        problem = replace(self.problem, scenarios=scenarios, fit_on=(names[0],), hold_out=(), recordings={})
+        problem = replace(problem or self.problem, scenarios=scenarios, fit_on=(names[0],), hold_out=(), recordings={})
         out: list[FloatArray | None] = []
         with self.study.pool(problem) as pool:
             for outcome in pool.map([Task(values, names[k]) for k, values in jobs]):

@@ -1,8 +1,9 @@
 r"""How surely a motion tells models apart, from what they predict on it.
 
 Let model m predict :math:`y_m + L_m z` in units of the noise, with z standard normal: the columns of L_m are what one
-standard deviation along each principal axis of its posterior changes, and what the offsets of a recording may. When
-model m is refitted to the old recordings and a new one, to first order its residual sum of squares grows by
+standard deviation along each principal axis of its posterior changes, and what the offsets of a recording and the
+error of its time step may. When model m is refitted to the old recordings and a new one, to first order its residual
+sum of squares grows by
 
 .. math:: Q_m = r^T (I + L_m L_m^T)^{-1} r, \qquad r = y - y_m .
 
@@ -36,7 +37,7 @@ class View:
 
     Args:
         mean: ``(N,)`` [noise standard deviations].
-        spread: ``(N, K)``, what its posterior and the offsets of a recording may change.
+        spread: ``(N, K)``, what its posterior, its time step and the offsets of a recording may change.
     """
 
     mean: FloatArray
