@@ -2,7 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,9 +34,9 @@ class Numerics:
         cost: rollouts elsewhere that it took.
     """
 
-    directions: dict[str, FloatArray] = field(default_factory=dict)
-    moved: dict[str, float] = field(default_factory=dict)
-    cost: int = 0
+    directions: dict[str, FloatArray]
+    moved: dict[str, float]
+    cost: int
 
 
 def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offsets: Offsets) -> Numerics:

@@ -20,6 +20,9 @@ FEW_POINTS = 3
 FAR_OFF = 3.0
 #: How many candidates pass the screening, and the first polish: by what they reach, and as many by what they promise.
 SCREENED, CONTENDERS = 5, 3
+#: Share of what is left of the budget that goes to finding out who leads; the rest is for polishing these, without
+#: which nothing is named.
+LEADERS_SHARE = 0.7
 #: The candidates that are polished to the end: this many, and all that explain this share of what the best does.
 FINALISTS, NEARLY = 2, 0.75
 
@@ -90,6 +93,7 @@ class _Tournament:
     def __init__(self, work: Work, effects: tuple[str, ...], plain: Polished, looks: dict[str, Look]) -> None:
         self.work, self.effects, self.plain, self.looks = work, effects, plain, looks
         self.points = work.study.config.diagnose.draws
+        self.until = work.count + LEADERS_SHARE * (work.limit - work.count)
         seed = work.study.config.study.seed
         # own stream for every candidate, whatever the others are
         self.rng = {name: np.random.default_rng([seed, 47, *name.encode()]) for name in looks}
@@ -134,7 +138,7 @@ class _Tournament:
         smallest, largest = look.step / look.reach, look.step
         size = float(np.sqrt(smallest * largest))
         for _ in range(FEW_POINTS):
-            if not self.work.may_go_on():
+            if not self.work.may_go_on(self.until):
                 break
             point = look.along(size)
             white = objective.many(point[None])[0]
@@ -157,7 +161,7 @@ class _Tournament:
         return self.moved(candidate, screening_points(candidate.space, base, starts, count, self.rng[candidate.name]))
 
     def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
-        if not self.work.may_go_on():
+        if not self.work.may_go_on(self.until):
             return candidate
         best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
         if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
@@ -166,7 +170,7 @@ class _Tournament:
 
     def approached(self, candidate: Candidate, evaluations: int) -> Candidate:
         """Some way towards the least square; derivatives are those of an earlier approach to the same point."""
-        if not self.work.may_go_on():
+        if not self.work.may_go_on(self.until):
             return candidate
         known = candidate.fit.jacobian if candidate.approached else None
         effects = (*self.effects, candidate.name)

@@ -13,8 +13,6 @@ from .work import Work
 MOST_EFFECTS = 3
 #: Where no effect alone is enough, pairs are tried with this many that explain at least this share of the misfit.
 LEADS, LEADING = 2, 0.2
-#: Share of the budget that the first stage may use.
-FIRST_SHARE = 3 / 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +40,7 @@ class Findings:
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     """Find what is missing among candidates ``names``, the plain model's fit starting at ``start`` (unit cube)."""
-    total = work.limit
-    work.limit = int(FIRST_SHARE * total)
-    first = run_stage(work, (), names, start)
-    work.limit = total
-    first = settled(work, first)
+    first = settled(work, run_stage(work, (), names, start))
     verdict = first.decision.verdict
     if verdict == "none":
         return _pair(work, names, first) or Findings("none", (), first, first, _nearest(first))

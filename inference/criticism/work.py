@@ -56,9 +56,9 @@ class Work:
         """Rollouts so far."""
         return self.pool.count + self._elsewhere
 
-    def may_go_on(self) -> bool:
-        """Is something left of the budget? That it was not, once, is remembered: :attr:`cut_short`."""
-        left = self.count < self.limit
+    def may_go_on(self, until: float = float("inf")) -> bool:
+        """Is something left of the budget, ``until`` so many? That it was not is remembered: :attr:`cut_short`."""
+        left = self.count < min(self.limit, until)
         self.cut_short |= not left
         return left
 

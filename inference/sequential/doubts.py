@@ -70,13 +70,15 @@ def step_matters(
         return []
     with SimulationPool(replace(pool.problem, simulator=finer), min(1, pool.workers)) as other:
         outcomes = dict(zip(plain, other.map([Task(values, name) for name in plain]), strict=True))
-    squares = []
+        pool.count += other.count
+    moved = np.zeros(0)
     for name, outcome in outcomes.items():
         if isinstance(outcome, Trajectory) and name in rough.sd:
-            moved = outcome.series.points - plain[name].series.points
-            squares.append(moved[rough.sd[name] <= noise.sd].ravel() ** 2)
-    changed = float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
-    if not changed > STEP_MATTERS * noise.sd:
+            apart = outcome.series.points - plain[name].series.points
+            moved = np.append(moved, apart[rough.sd[name] <= noise.sd])
+    moved = moved[np.isfinite(moved)]  # a point may be out of a picture
+    changed = float(np.linalg.norm(moved) / np.sqrt(max(len(moved), 1)))
+    if changed <= STEP_MATTERS * noise.sd:
         return []
     size = f"{1e3 * changed:.2g} mm" if noise.unit == "m" else f"{changed:.2g} px"
     return [

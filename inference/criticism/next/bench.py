@@ -111,9 +111,8 @@ class Bench:
                 ends = [next(outcomes) for _ in units]
                 proposal.failed |= any(e is None for e in ends)
                 columns = [w * (e - base).ravel() for e, w in zip(ends, weights, strict=True) if e is not None]
-                columns += [
-                    STEP_ERROR * c.ravel() for end in (next(finer),) if end is not None for c in changes(base, end)
-                ]
+                if (end := next(finer)) is not None:
+                    columns += [STEP_ERROR * c.ravel() for c in changes(base, end)]
                 spreads.append(self._white(np.column_stack([*columns, self._offsets(base)])))
             if proposal.failed:
                 continue
