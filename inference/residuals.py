@@ -1,5 +1,6 @@
 """Measured minus predicted, in units of the noise, with clock and constant offsets taken out."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -96,6 +97,13 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
     if offsets.constant > 0:
         parts.append(constant / offsets.constant)
     return Residual(difference, np.concatenate(parts), clock)
+
+
+def rms_apart(pairs: Iterable[tuple[FloatArray, FloatArray]]) -> float:
+    """Root mean square a coordinate between points of like shape, where both are seen [unit]; 0 where none are."""
+    squares = np.concatenate([np.zeros(0), *(((a - b) ** 2).ravel() for a, b in pairs)])
+    seen = squares[np.isfinite(squares)]
+    return float(np.sqrt(seen.mean())) if len(seen) else 0.0
 
 
 def failed(recording: Recording, offsets: Offsets) -> FloatArray:

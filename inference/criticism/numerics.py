@@ -16,7 +16,7 @@ from ...core.series import PointSeries
 from ...core.simulator import Simulator
 from ...core.study import Problem, SimulationPool, Task
 from ..noise import Noise
-from ..residuals import Offsets, residual
+from ..residuals import Offsets, residual, rms_apart
 
 #: How much larger the whole error is than what a step or spacing of half the size takes away: first-order methods
 #: still have as much before them, second-order ones a third.
@@ -72,10 +72,10 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
     for (what, (_, size, _)), made in zip(variants.items(), others, strict=True):
         for name in made.keys() & as_it_is.keys():
             columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
-        pairs = [(as_it_is[n].points, made[n].points) for n in problem.fit_on if n in made.keys() & as_it_is.keys()]
-        apart = [((a - b) ** 2).ravel() for a, b in pairs if a.shape == b.shape]
-        if apart:
-            moved[what] = float(np.sqrt(np.nanmean(np.concatenate(apart))))
+        both = [n for n in problem.fit_on if n in made.keys() & as_it_is.keys()]
+        pairs = [(as_it_is[n].points, made[n].points) for n in both]
+        if alike := [(a, b) for a, b in pairs if a.shape == b.shape]:
+            moved[what] = rms_apart(alike)
     return Numerics({n: np.stack(c, axis=1) for n, c in columns.items() if c}, moved, cost)
 
 

@@ -3,14 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import SimulationPool, Task
 from ..noise import Noise
+from ..residuals import rms_apart
 from ..roughness import Roughness, roughness, unrepeatable
 
 #: A step that moves the model by more than this is told of [noise standard deviations].
@@ -71,13 +70,12 @@ def step_matters(
     with SimulationPool(replace(pool.problem, simulator=finer), min(1, pool.workers)) as other:
         outcomes = dict(zip(plain, other.map([Task(values, name) for name in plain]), strict=True))
         pool.count += other.count
-    moved = np.zeros(0)
+    pairs = []
     for name, outcome in outcomes.items():
         if isinstance(outcome, Trajectory) and name in rough.sd:
-            apart = outcome.series.points - plain[name].series.points
-            moved = np.append(moved, apart[rough.sd[name] <= noise.sd])
-    moved = moved[np.isfinite(moved)]  # a point may be out of a picture
-    changed = float(np.linalg.norm(moved) / np.sqrt(max(len(moved), 1)))
+            counts = rough.sd[name] <= noise.sd
+            pairs.append((outcome.series.points[counts], plain[name].series.points[counts]))
+    changed = rms_apart(pairs)
     if changed <= STEP_MATTERS * noise.sd:
         return []
     size = f"{1e3 * changed:.2g} mm" if noise.unit == "m" else f"{changed:.2g} px"

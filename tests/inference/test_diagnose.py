@@ -90,6 +90,7 @@ def test_nothing_is_named_where_nothing_is_missing(small_study: Study) -> None:
     check_schema(result)
     assert result["verdict"] in ("no-misfit", "cannot-tell")
     assert result["effects"] == []
+    assert result["numerics"]["step"] > 0 and result["numerics"]["mesh"] > 0
     assert result["error"]["after"] == result["error"]["before"]
 
 

@@ -9,7 +9,7 @@ from muslin.core.differences import fourth_differences
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
 from muslin.inference.noise import Noise, _from_repeats
-from muslin.inference.residuals import Offsets, failed, residual
+from muslin.inference.residuals import Offsets, failed, residual, rms_apart
 
 TIME = np.arange(0, 2, 0.02)
 NOISE = Noise(0.001, 0.0, "test", "m", 0.01)
@@ -148,3 +148,12 @@ def test_a_cloud_with_gaps_is_held_against_what_was_predicted() -> None:
     assert np.isnan(r.difference[:, ::3]).all() and np.isnan(r.difference[[2, 4]]).all()
     kept = np.delete(r.difference, [2, 4], axis=0)[:, 2::3]
     assert np.abs(kept).max() == 0.0
+
+
+def test_points_are_as_far_apart_as_those_that_are_seen() -> None:
+    base = np.zeros((4, 2, 3))
+    moved = base + 0.003
+    moved[1, 0] = np.nan
+    assert rms_apart([(base, moved), (base, base - 0.003)]) == pytest.approx(0.003)
+    assert rms_apart([(base, base * np.nan)]) == 0.0
+    assert rms_apart([]) == 0.0

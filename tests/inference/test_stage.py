@@ -1,0 +1,75 @@
+"""How a diagnosis spends its simulations, and what it says of a misfit that stays."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_verdict import COUNT, candidate
+
+from muslin.core.arrays import FloatArray
+from muslin.inference.criticism import work
+from muslin.inference.criticism.diagnose import _rest
+from muslin.inference.criticism.linear import Look
+from muslin.inference.criticism.stage import _Tournament
+from muslin.inference.criticism.verdict import Decision
+from muslin.inference.criticism.work import Work
+from muslin.inference.polish import Polished
+
+
+def test_a_budget_ends_where_it_is_told_to_and_that_is_remembered() -> None:
+    spent = SimpleNamespace(count=650, limit=850, cut_short=False)
+    assert Work.may_go_on(spent) and not spent.cut_short  # type: ignore[arg-type]
+    assert not Work.may_go_on(spent, until=645.0) and spent.cut_short  # type: ignore[arg-type]
+
+
+def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "offsets_of", lambda study: None)
+    asked = SimpleNamespace(config=SimpleNamespace(diagnose=SimpleNamespace(draws=4, simulations=1000)))
+    problem = SimpleNamespace(space=SimpleNamespace(to_unit=lambda samples: samples))
+    fit = SimpleNamespace(samples=np.zeros((9, 1)), derivative_step=1e-3)
+    assert Work(asked, problem, SimpleNamespace(), fit).limit == 850  # type: ignore[arg-type]
+
+
+def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
+    drag = candidate("drag", 2 * COUNT)
+    plain = Polished(np.array([0.5]), drag.fit.white, np.ones((len(drag.fit.white), 1)), np.eye(1), COUNT)
+    start = np.array([0.5, 0.0])
+    jacobian = np.tile([1.0, 0.5], (len(plain.white), 1))
+    look = Look("drag", drag.space, start, jacobian, start, plain.rss, 0.1, 1.0)
+    refitted = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
+        refitted.append(effects)
+        return candidate("drag", COUNT).fit
+
+    config = SimpleNamespace(diagnose=SimpleNamespace(draws=4), study=SimpleNamespace(seed=1))
+    bench = SimpleNamespace(
+        study=SimpleNamespace(config=config, progress=lambda *_: None), starts=np.full((2, 1), 0.5),
+        count=0, limit=1000, cut_short=False, polished=polished,
+    )  # fmt: skip
+    bench.may_go_on = lambda until=np.inf: Work.may_go_on(bench, until)  # type: ignore[arg-type]
+    tournament = _Tournament(bench, (), plain, {"drag": look})  # type: ignore[arg-type]
+    bench.count = 800  # most of it went before anything could be refitted
+    (found,) = tournament.run()
+    assert refitted == [("drag",)] and found.refitted and found.rss == pytest.approx(COUNT)
+
+
+@pytest.mark.parametrize(
+    ("left", "rest", "cut_short", "said"),
+    [
+        (0.0, None, True, None),
+        (9.0, None, False, None),
+        (9.0, None, True, "unfinished"),
+        (9.0, Decision("none", ()), False, "none"),
+        (9.0, Decision("no-misfit", ()), True, None),
+        (9.0, Decision("cannot-tell", (), unfinished=True), True, "unfinished"),
+    ],
+)
+def test_what_stays_is_told_as_far_as_it_was_looked_into(
+    left: float, rest: Decision | None, cut_short: bool, said: str | None
+) -> None:
+    joint, spent = SimpleNamespace(left=lambda _: left), SimpleNamespace(cut_short=cut_short)
+    named = SimpleNamespace(verdict="named", further=(), after=None, rest=rest)
+    assert _rest(named, joint, spent) == said  # type: ignore[arg-type]
+    for other in ({"verdict": "none"}, {"further": ("wind", "drag")}):
+        assert _rest(SimpleNamespace(**{**vars(named), **other}), joint, spent) is None  # type: ignore[arg-type]
