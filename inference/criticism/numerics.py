@@ -29,12 +29,14 @@ class Numerics:
 
     Args:
         directions: of the white residuals, ``(N_r, K)`` by recording.
+        beyond: those of changes that take the model further from the measurement: better numbers do not explain it.
         moved: how far the fitted recordings go from what the model predicts, root mean square a coordinate, by what
             was changed: ``"step"`` (half of it), ``"mesh"`` (finer), or the name of another engine [m or px].
         cost: rollouts elsewhere that it took.
     """
 
     directions: dict[str, FloatArray]
+    beyond: dict[str, FloatArray]
     moved: dict[str, float]
     cost: int
 
@@ -43,7 +45,8 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
     """Simulate the pool's problem at ``values`` with a finer step, on a finer mesh, and on every other engine.
 
     Each direction comes twice, see :func:`changes`. Directions that cannot be had (no other engine is there, or it
-    cannot do this) are left out.
+    cannot do this) are left out. A change towards better numbers that lets the misfit grow cannot be what the misfit is
+    due to: its directions are kept apart (:attr:`Numerics.beyond`).
     """
     problem = pool.problem
     names = (*problem.fit_on, *problem.hold_out)
@@ -61,7 +64,8 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
         if not any(why_powerless(effect, simulator, scenario) for effect in used):
             variants[simulator.name] = replace(problem, simulator=simulator), 1.0, 1
     as_it_is = _predicted(pool, values, names)
-    columns: dict[str, list[FloatArray]] = {n: [] for n in names}
+    towards: dict[str, list[FloatArray]] = {n: [] for n in names}
+    beyond: dict[str, list[FloatArray]] = {n: [] for n in names}
     with ExitStack() as stack:  # an interruption ends the processes first, then the threads that wait for them
         threads = stack.enter_context(ThreadPoolExecutor(max(1, pool.workers)))
         # a few rollouts each: but on the finer mesh, starting more than one process would take longer
@@ -70,13 +74,23 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
         cost = sum(elsewhere.count for elsewhere in pools)
     moved = {}
     for (what, (_, size, _)), made in zip(variants.items(), others, strict=True):
-        for name in made.keys() & as_it_is.keys():
-            columns[name] += _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
+        found = {
+            name: _columns(problem, name, as_it_is[name], made[name], size, noise, offsets)
+            for name in names
+            if name in made.keys() & as_it_is.keys()
+        }
+        gain = sum(g for name, (_, g) in found.items() if name in problem.fit_on)
+        for name, (columns, _) in found.items():
+            (towards if gain >= 0.0 else beyond)[name] += columns
         both = [n for n in problem.fit_on if n in made.keys() & as_it_is.keys()]
         pairs = [(as_it_is[n].points, made[n].points) for n in both]
         if alike := [(a, b) for a, b in pairs if a.shape == b.shape]:
             moved[what] = rms_apart(alike)
-    return Numerics({n: np.stack(c, axis=1) for n, c in columns.items() if c}, moved, cost)
+    return Numerics(_stacked(towards), _stacked(beyond), moved, cost)
+
+
+def _stacked(columns: dict[str, list[FloatArray]]) -> dict[str, FloatArray]:
+    return {name: np.stack(its, axis=1) for name, its in columns.items() if its}
 
 
 def changes(base: FloatArray, other: FloatArray) -> list[FloatArray]:
@@ -109,15 +123,18 @@ def _predicted(pool: SimulationPool, values: dict[str, float], names: tuple[str,
 
 def _columns(
     problem: Problem, name: str, base: PointSeries, other: PointSeries, size: float, noise: Noise, offsets: Offsets
-) -> list[FloatArray]:
+) -> tuple[list[FloatArray], float]:
+    """Of one recording and one change: its directions, and how fast going along it lessens half the square misfit."""
     recording = problem.recordings[name]
     if base.points.shape != other.points.shape:
-        return []
+        return [], 0.0
     white = residual(recording, base, noise, offsets).white
-    out = []
-    for change in changes(base.points, other.points):
+    out, gain = [], 0.0
+    for k, change in enumerate(changes(base.points, other.points)):
         moved = replace(base, points=base.points + change)
         column = size * (residual(recording, moved, noise, offsets).white - white)
         if np.isfinite(column).all():
             out.append(column)
-    return out
+            if k == 0:  # the second one is what may grow or shrink of it
+                gain = -float(column @ white)
+    return out, gain

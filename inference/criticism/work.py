@@ -79,7 +79,7 @@ class Work:
         names = (*self.problem.fit_on, *self.problem.hold_out)
         self.rough = roughness(self.pool, space, unit, names)
         self.discrepancy = self.rough.discrepancy(
-            self.problem.recordings, self.fit.noise, self.offsets, found.directions
+            self.problem.recordings, self.fit.noise, self.offsets, found.directions, found.beyond
         )
         check_repeatable(self.discrepancy, self.problem.fit_on)
         self._elsewhere += found.cost

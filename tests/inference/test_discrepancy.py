@@ -34,3 +34,16 @@ def test_what_lies_along_a_direction_is_explained_and_what_lies_across_is_not(di
     assert d.explained("fling", seen) == pytest.approx(along @ along, rel=1e-3)
     np.testing.assert_allclose(d.whitened("fling", across), across, atol=1e-10)
     assert d.explained("fling", across) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_directions_beyond_excuse_what_is_left_and_whiten_nothing(directions: np.ndarray) -> None:
+    apart = Discrepancy({"fling": directions[:, :2]}, beyond={"fling": directions[:, 2:], "swing": directions})
+    plain = Discrepancy({"fling": directions[:, :2]})
+    white = np.random.default_rng(4).normal(size=40) + directions @ np.array([1.0, -2.0, 15.0])
+    np.testing.assert_array_equal(apart.whitened("fling", white), plain.whitened("fling", white))
+    np.testing.assert_array_equal(apart.whitened("swing", white), white)
+    every = Discrepancy({"fling": directions})
+    told = every.explained("fling", every.whitened("fling", white))
+    assert apart.explained("fling", apart.whitened("fling", white)) == pytest.approx(told, rel=1e-9)
+    assert apart.explained("swing", white) == pytest.approx(told, rel=1e-9)
+    assert plain.explained("fling", plain.whitened("fling", white)) < told
