@@ -136,7 +136,8 @@ class Work:
             after: with all that was found.
             plain: fits of the model as it was, of which the nearest counts.
         """
-        effects = tuple(dict.fromkeys(n.split(".", 1)[0] for n in after.space.names if "." in n))
+        has = set(self.problem.space.names)  # the study's own effects are in every space already
+        effects = tuple(dict.fromkeys(n.split(".", 1)[0] for n in after.space.names if "." in n and n not in has))
         later = replace(after, fit=self._again(effects, after.fit))
         return self.evidence((), min((self._again((), fit) for fit in plain), key=lambda p: p.rss), [later])
 

@@ -57,6 +57,10 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     rows = {r.recording: r for r in added.compare().rows}
     assert rows["other"].role == "held-out"
     assert rows["other"].rmse < 1.15 * rows["other"].noise
+    added.config.diagnose.candidates = ["hem", "viscous-damping"]
+    again = added.diagnose().result  # with the effect in the model nothing more is missing
+    check_schema(again)
+    assert again["effects"] == [] and again["verdict"] in ("no-misfit", "cannot-tell")
 
 
 @pytest.mark.slow
