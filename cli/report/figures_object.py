@@ -50,9 +50,15 @@ class Snapshot:
         return self.correspondence and self.predicted.shape == self.measured.shape
 
     def errors(self) -> FloatArray:
-        """Distance ``(P,)`` of each predicted point to its measured one, or to the nearest without correspondence."""
+        """Distance ``(P,)`` of each predicted point to its measured one, or to the nearest without correspondence.
+
+        Of a point that was measured along some axes only, the distance along these; NaN of one that was not seen.
+        """
         if self.paired:
-            return np.asarray(np.linalg.norm(self.predicted - self.measured, axis=1))
+            apart = self.predicted - self.measured
+            seen = np.isfinite(apart)
+            along = np.sqrt(np.sum(np.where(seen, apart, 0.0) ** 2, axis=1))
+            return np.asarray(np.where(seen.any(axis=1), along, np.nan))
         seen = self.measured[np.isfinite(self.measured).all(axis=1)]
         gaps = np.linalg.norm(self.predicted[:, None] - seen[None], axis=2)
         return np.asarray(gaps.min(axis=1) if len(seen) else np.full(len(self.predicted), np.nan))
@@ -187,8 +193,9 @@ def add_snapshots(figure: FigureBase, spots: list[Axes], shots: list[Snapshot], 
         axes.set_ylim(float(low[1]), float(high[1]))
         axes.set_aspect("equal")
         bare(axes)
-        mean = float(np.sqrt(np.nanmean(shot.errors() ** 2))) * factor
-        axes.set_title(f"{shot.title}: points {plain(mean)} {label} away", fontsize=9.5, color=INK)
+        errors = shot.errors()[np.isfinite(shot.errors())]
+        away = f": points {plain(float(np.sqrt(np.mean(errors**2))) * factor)} {label} away" if len(errors) else ""
+        axes.set_title(f"{shot.title}{away}", fontsize=9.5, color=INK)
     _scale_bar(spots[0], low, high, factor, label)
     drawn = figure.colorbar(
         ScalarMappable(Normalize(0.0, top * factor), ERROR_MAP), ax=spots, shrink=0.7, aspect=28, pad=0.02

@@ -48,7 +48,10 @@ def points_figure(take: Take, index: int) -> str | None:
     after = take.point_after * factor if take.point_after is not None and take.after is not None else None
     seen = np.isfinite(take.measured).all(axis=2)
     first = int(seen.sum(axis=1).argmax())
-    place = flat_layout(take.measured[first])
+    places = take.measured if seen.any() else take.predicted  # of falling balls the height alone is seen
+    if places is None:
+        return None
+    place = flat_layout(places[first])
     maps = [before] if after is None else [before, after]
     norm = Normalize(0.0, max(float(np.nanmax(before)), 4.0 * (take.noise or 0.0) * factor))
     with look(f"points{index}"):

@@ -1,5 +1,7 @@
 """One wide picture of a whole study, for a README."""
 
+from textwrap import fill
+
 from ...core.errors import StepMissingError
 from ...core.study.study import Study
 from .figures_error import draw_error, error_ceiling
@@ -7,6 +9,9 @@ from .figures_object import add_snapshots, snapshots
 from .gather import gather
 from .style import AFTER, BEFORE, INK, look, new_figure, png
 from .verdict import verdict
+
+#: Letters of a line of the headline, as many as are sure to fit.
+_WIDEST = 120
 
 
 def draw_overview(study: Study, after: Study | None = None) -> bytes:
@@ -21,7 +26,7 @@ def draw_overview(study: Study, after: Study | None = None) -> bytes:
     take, name = found.takes[0], found.after_label
     with look("overview"):
         figure = new_figure(13.0, 4.6)
-        figure.suptitle(verdict(found).headline, x=0.012, ha="left", fontsize=13, color=INK)
+        figure.suptitle(fill(verdict(found).headline, _WIDEST), x=0.012, ha="left", fontsize=13, color=INK)
         left, right = list(figure.subfigures(1, 2, width_ratios=[1.0, 1.25], squeeze=False)[0])
         axes = left.add_subplot()
         draw_error(axes, take, error_ceiling([take]))

@@ -13,10 +13,12 @@ from made_up_study import ROLES, make_study
 
 from muslin.cli import steps
 from muslin.cli.report import overview_figure, write_report
+from muslin.cli.report.figures_object import snapshots
 from muslin.cli.report.gather import gather
 from muslin.cli.report.predictive import predictive_data
 from muslin.cli.report.words import spread
 from muslin.core.errors import MissingFileError, MuslinError, StepMissingError, StoreError
+from muslin.core.store import storage_errors
 from muslin.core.study.study import Study
 
 
@@ -240,6 +242,23 @@ def test_overview_picture(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     with pytest.raises(StepMissingError, match="muslin compare"):
         overview_figure(make_study(tmp_path / "b", "fit"))
+
+
+@pytest.mark.parametrize("axes", [slice(0, 2), slice(0, 3)])
+def test_points_that_are_seen_along_some_axes_only_are_drawn_and_told(tmp_path: Path, axes: slice) -> None:
+    """Of falling balls the height alone, and here and there not even that."""
+    study = make_study(tmp_path, "fit", "compare")
+    with storage_errors(study.results_path):
+        compared = study.results("r+")["compare"]
+        for name in ROLES:
+            for array in ("measured", "difference"):
+                values = np.asarray(compared[f"{name}/{array}"])
+                values[..., axes] = np.nan
+                compared[f"{name}/{array}"][...] = values
+    shown = snapshots(gather(study).takes[0], "")[0]
+    assert np.isfinite(shown.errors()).any() == (axes.stop < 3)
+    assert overview_figure(study).startswith(b"\x89PNG")
+    assert "error" in page_of(study).text
 
 
 @pytest.mark.parametrize(
