@@ -56,22 +56,20 @@ class AddedMass(Effect):
         return loads + np.bincount(body.elements.ravel(), air, minlength=len(loads))
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
-        triangles, air = scene.body.elements, self._air(scene.body)[:, None, None]
-        corners = triangles.ravel()
+        corners, air = np.ascontiguousarray(scene.body.elements.T), self._air(scene.body)
+        flat, gravity = corners.ravel(), scene.gravity[:, None, None]
         bulk = _BulkAcceleration(masses, scene.held)
 
         def force(time: float, state: State) -> FloatArray:
-            p, v = state.positions[triangles], state.velocities[triangles]
-            a = bulk(time, state)[triangles]
-            n, gradient = _normals_and_gradients(p)
-            within = a - n * np.sum(n * a, axis=2, keepdims=True)
-            through = np.sum(n * v, axis=2, keepdims=True)
-            turning = -np.sum(gradient * through, axis=1, keepdims=True)  # the rate of n
-            caught = np.sum(turning * v, axis=2, keepdims=True)
-            out = air * (within - scene.gravity - np.where(caught * through > 0, caught, 0.0) * n)
-            return np.stack(
-                [np.bincount(corners, out[..., k].ravel(), minlength=len(masses)) for k in range(3)], axis=1
-            )
+            p, v, a = (x.T[:, corners] for x in (state.positions, state.velocities, bulk(time, state)))
+            normal, gradient = _normals_and_gradients(p)
+            n = normal[:, None]
+            within = a - n * np.sum(n * a, axis=0)
+            through = np.sum(n * v, axis=0)
+            turning = -np.sum(gradient * through, axis=1)  # the rate of n
+            caught = np.sum(turning[:, None] * v, axis=0)
+            out = air * (within - gravity - np.where(caught * through > 0, caught, 0.0) * n)
+            return np.stack([np.bincount(flat, x.ravel(), minlength=len(masses)) for x in out], axis=1)
 
         return force
 
@@ -93,12 +91,22 @@ def width(body: Body) -> float:
 
 
 def _normals_and_gradients(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Unit normals ``(F, 1, 3)`` of triangles ``(F, 3, 3)``, and the gradients of their corner shares ``(F, 3, 3)``."""
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    double = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None, None]
-    unit = normal[:, None] / double
+    """Of triangles ``(3 coordinates, 3 corners, F)``: unit normals ``(3, F)``, and the gradients of their corner shares
+    ``(3, 3, F)``.
+
+    Coordinates come first, which keeps the loops of NumPy as long as there are triangles.
+    """
+    normal = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double = np.maximum(np.sqrt(np.sum(normal**2, axis=0)), 1e-300)
+    unit = normal / double
     opposite = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
-    return unit, np.cross(unit, opposite) / double
+    return unit, _cross(unit[:, None], opposite) / double
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Products of vectors whose coordinates come first ``(3, …)``."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 class _BulkAcceleration:
