@@ -18,9 +18,9 @@ from .carried_turns import carried_turns
 HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
 #: Lags of the camera behind the gripper that are tried [s]: beyond what was found, both ways.
 LAGS = np.arange(-0.6, 0.6001, 0.01)
-#: Hand and cloth must correlate this much at some lag [1]: in the published takes it is 0.90 at least.
+#: Hand and cloth must correlate this much at some lag [1].
 ALIKE = 0.8
-#: What goes no farther than this about its middle, root mean square, rests [m]: the published hands go 78 mm and more.
+#: What goes no farther than this about its middle, root mean square, rests [m].
 RESTS = 0.005
 
 

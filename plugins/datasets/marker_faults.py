@@ -8,18 +8,16 @@ from ...core.arrays import BoolArray, FloatArray, IntArray
 
 #: Frames were lost where most markers go more than this farther [m] ...
 LOST_STEP = 0.001
-#: ... and more than this many times as far as in the frames before and after [1]. In the 168 published takes 0.99 of
-#: all steps are less than 0.3 mm above those beside them; the few beyond 1 mm are mostly 2, some up to 13 times as far.
+#: ... and more than this many times as far as in the frames before and after [1]: one lost frame makes it twice as far.
 LOST_RATIO = 1.5
-#: Below this step [m] how many frames were lost cannot be told, as nothing moves. In the published takes it is 1.2 mm
-#: at least where frames were lost.
+#: Below this step [m] how many frames were lost cannot be told, as nothing moves.
 LOST_FLOOR = 0.0005
-#: More frames than this are not lost but a jump: the cable was somewhere else [1]. In the published takes it is 19.
+#: More frames than this are not lost but a jump: the cable was somewhere else [1].
 MOST_LOST = 25
 #: A distance between neighbours is wrong if it is this far from its own median [m] ...
 WRONG_DISTANCE = 0.018
-#: ... and this many of its robust standard deviations [1]. The chord of a bent cable is shorter, by 16 mm at most in
-#: the published takes without faults; two markers that change places move a distance by 20 to 100 mm.
+#: ... and this many of its robust standard deviations [1]. The chord of a bent cable is shorter, too, but by less than
+#: what two markers that change places move a distance by.
 WRONG_DEVIATIONS = 6.0
 #: Which of two neighbours is wrong, their distances to so many markers along the cable tell. A sharp bend shortens the
 #: longer of these, too, so they alone make no frame wrong.
