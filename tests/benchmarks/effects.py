@@ -18,8 +18,11 @@ import argparse
 import hashlib
 import itertools
 import json
+import multiprocessing as mp
 import os
 import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +51,8 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--kinds", nargs="*", choices=list(BLOCK), default=list(BLOCK), help="of truth, these alone")
     parser.add_argument("--baselines", nargs="*", choices=list(BASELINES), default=list(BASELINES), metavar="NAME")
     parser.add_argument("--draws", type=int, default=500, help="that amortised baselines learn from, a setting")
-    parser.add_argument("--workers", type=int, default=2, help="processes of a study (default: 2)")
+    parser.add_argument("--at-once", type=int, default=2, help="cases that run beside one another (default: 2)")
+    parser.add_argument("--workers", type=int, default=1, help="processes of each study (default: 1)")
     parser.add_argument("--output", type=Path, default=RESULTS / "effects.json")
     return parser.parse_args()
 
@@ -104,17 +108,12 @@ def main() -> None:
     a.output.parent.mkdir(parents=True, exist_ok=True)
     kept = Kept(a.output.with_suffix(".cells.partial"), [sources(), how.baselines, how.draws])
     cache = a.output.with_suffix(".draws.partial")
-    began, records = time.monotonic(), []
+    began, found = time.monotonic(), {}
     cases = chosen(a.part, a.cases, a.settings, a.kinds)
-    for number, case in enumerate(cases, 1):
-        record = kept.get(case)
-        if record is None:
-            if time.monotonic() - began > 60 * a.minutes:
-                continue  # later ones may be finished
-            record = run_case(case, how, cache)
-            kept.add(case, record)
-        records.append(record)
-        print(f"{number:4d} {told(record)}", flush=True)
+    for number, record in finished(cases, kept, how, cache, a.at_once, began + 60 * a.minutes):
+        found[number] = record
+        print(f"{number + 1:4d} {told(record)}", flush=True)
+    records = [found[number] for number in sorted(found)]
     rows = figures(records, how.baselines)
     table = markdown(rows, how.baselines)
     left_out = sum("left_out" in r for r in records)
@@ -131,6 +130,26 @@ def main() -> None:
     a.output.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     a.output.with_suffix(".md").write_text(f"{about}\n{table}", encoding="utf-8")
     print(f"\n{about}\n{table}\nwrote {a.output} and {a.output.with_suffix('.md')}")
+
+
+def finished(
+    cases: Sequence[Case], kept: Kept, how: Plan, cache: Path, at_once: int, deadline: float
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Index and record of the cases that are kept, then of those that can start before ``deadline``, as they end."""
+    known = {number: record for number, case in enumerate(cases) if (record := kept.get(case)) is not None}
+    yield from known.items()
+    left = iter([number for number in range(len(cases)) if number not in known])
+    running: dict[Future[dict[str, Any]], int] = {}
+    with ProcessPoolExecutor(at_once, mp_context=mp.get_context("spawn")) as pool:
+        while True:
+            while len(running) < at_once and time.monotonic() < deadline and (number := next(left, None)) is not None:
+                running[pool.submit(run_case, cases[number], how, cache)] = number
+            if not running:
+                return
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                number = running.pop(future)
+                kept.add(cases[number], future.result())
+                yield number, future.result()
 
 
 def short(record: dict[str, Any]) -> dict[str, Any]:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from effects import Kept, chosen
+from effects import Kept, chosen, finished
 from effects_bench.cases import BLOCK, FIRST_SEEDS, SETTING_DECK, Case, plan
 from effects_bench.generation import flaws, generate
 from effects_bench.outside import LAWS, UNKNOWN, effect_class
+from effects_bench.running import Plan
 from effects_bench.settings import SETTINGS
 from effects_bench.strength import RANGES, solve
 
@@ -184,3 +185,10 @@ def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
     assert Kept(path, ["sources", 1]).get(CASE) == {"failed": None, "seconds": 1.5}
     assert Kept(path, ["sources", 1]).get(replace(CASE, seed=8)) is None
     assert Kept(path, ["other sources", 1]).get(CASE) is None
+
+
+def test_what_is_finished_is_told_though_the_time_is_up(tmp_path: Path) -> None:
+    kept, cases = Kept(tmp_path / "cells", ["sources"]), [CASE, replace(CASE, seed=8), replace(CASE, seed=9)]
+    kept.add(cases[2], {"seconds": 1.5})
+    again = Kept(tmp_path / "cells", ["sources"])
+    assert list(finished(cases, again, Plan(1, (), 1), tmp_path, 2, deadline=0.0)) == [(2, {"seconds": 1.5})]

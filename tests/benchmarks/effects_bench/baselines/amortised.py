@@ -1,5 +1,6 @@
 """A classifier that has seen many simulated draws, with every effect and with none."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -69,7 +70,7 @@ def _simulate(trial: Trial, path: Path) -> None:
             kept.append(name)
     path.parent.mkdir(parents=True, exist_ok=True)
     arrays = {f"points_{r}": np.stack([w[k] for w in whole]).astype(np.float32) for k, r in enumerate(recordings)}
-    half = path.with_suffix(".half.npz")
+    half = path.with_suffix(f".{os.getpid()}.npz")  # another case may be making the same
     np.savez_compressed(half, labels=np.array(kept), **arrays)
     half.replace(path)
 
