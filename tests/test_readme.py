@@ -56,6 +56,14 @@ def test_the_table_of_posteriors_is_what_the_benchmark_wrote() -> None:
             assert cell == wanted
 
 
+def test_the_table_of_real_recordings_is_what_the_benchmark_wrote() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "tests/benchmarks/readme_table.py"], capture_output=True, text=True, check=True
+    )
+    table = done.stdout[done.stdout.index("| held-out error [mm] | carried along") :].rstrip()
+    assert table.count("\n") > 8 and table in README
+
+
 def test_the_tables_of_perception_are_what_the_benchmark_wrote() -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "tests/benchmarks/perception_table.py"], capture_output=True, text=True, check=True

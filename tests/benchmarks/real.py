@@ -8,73 +8,38 @@ skipped where it has none::
 
 import argparse
 import json
+import subprocess
 import tempfile
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from real_cases import CASES, Case
+from real_cases import CASES, ROOT, Case
+from real_measures import measures, open_loop
 from table import RESULTS, machine, versions
 
-from muslin.core.errors import RolloutFailed
-from muslin.core.registry import REGISTRY
-from muslin.core.study import Problem, Study, build_problem
+from muslin.cli.report import overview_figure
+from muslin.core.study import Study
+from muslin.inference.sequential.result import load_fit
 
+PICTURES = ROOT / "docs/real"
 COLUMNS = ("baseline", "unfitted", "fitted", "after", "noise")
 TITLES = ("set", "fitted on", "held out", *COLUMNS, "verdict", "rollouts", "seconds")
 
 
-def absolute(problem: Problem, values: Mapping[str, float], effects: list[str]) -> dict[str, float]:
-    """Errors [m] on the held-out takes of ``problem``: of a point, the median; of a coordinate, the mean absolute one.
-
-    ``median_take`` is the median over takes of the latter, ``failed`` how many takes could not be simulated; NaN where
-    none could.
-    """
-    problem = replace(problem, effects={n: REGISTRY.get("effect", n) for n in effects})
-    off, failed = [], 0
-    for name in problem.hold_out:
-        try:
-            simulated = problem.simulate(values, name).series.points
-        except RolloutFailed:
-            failed += 1
-            continue
-        difference = simulated - problem.recordings[name].series.points
-        off.append(difference[np.isfinite(difference).all(axis=2)])
-    if not off:
-        return {"takes": 0, "failed": failed} | dict.fromkeys(
-            ("median_point", "mean_coordinate", "median_take"), np.nan
-        )
-    every = np.concatenate(off)
-    return {
-        "takes": len(off),
-        "failed": failed,
-        "median_point": float(np.median(np.linalg.norm(every, axis=1))),
-        "mean_coordinate": float(np.mean(np.abs(every))),
-        "median_take": float(np.median([np.mean(np.abs(o)) for o in off])),
-    }
-
-
-def never_used(study: Study) -> Problem | None:
-    """Of the takes that are in the measurement and neither fitted nor held out, as held-out ones; None without any."""
-    known = {*study.problem.fit_on, *study.problem.hold_out}
-    left = [n for n in study.measurement.names if n not in known]
-    if not left:
-        return None
-    config = study.config.model_copy(deep=True)
-    config.study.hold_out = left
-    return build_problem(config, study.measurement, study.path.parent)
-
-
 def row_of(case: Case, study: Study) -> dict[str, Any]:
-    """One line of the table, lengths in metres: fit, compare, diagnose."""
+    """One line of the table, lengths in metres: fit, compare, diagnose; then with what was named, fitted anew.
+
+    Of several effects that are tied the first is taken.
+    """
     began = time.monotonic()
     fit = study.fit()
     held = [r for r in study.compare().rows if r.role == "held-out"]
     found = study.diagnose().result
-    seconds = time.monotonic() - began
+    middle = study.problem.space.as_dict(study.problem.space.from_unit(np.full(len(study.problem.space), 0.5)))
+    states = {"unfitted": (study, middle), "fitted": (study, fit.values())}
     row: dict[str, Any] = {
         "set": case.name,
         "fitted on": list(study.problem.fit_on),
@@ -82,40 +47,54 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
         "baseline": rms([r.baseline for r in held]),
         "unfitted": rms([r.default for r in held]),
         "fitted": rms([r.rmse for r in held]),
-        "after": found["error"]["after"] if found["effects"] else None,
+        "after": None,
         "noise": fit.noise.sd,
         "noise from": fit.noise.source,
         "verdict": f"{found['verdict']}: {', '.join(found['effects']) or '-'}",
         "rollouts": int(fit.simulations) + int(found["simulations"]),
-        "seconds": round(seconds, 1),
-        "estimate": fit.values(),
+        "posterior": posterior(study),
+        **measures(study),
         "told": found["told"],
         "candidates": [
             {k: c[k] for k in ("name", "coefficients", "explained", "z", "objection", "held_out_after")}
             for c in found["candidates"][:5]
         ],
     }
+    better = None
+    for effect in found["effects"][: 1 if found["verdict"] == "tied" else None]:
+        better = (better or study).add(effect)
+    if better is not None:
+        after = better.fit()
+        row["after"] = rms([r.rmse for r in better.compare().rows if r.role == "held-out"])
+        row["rollouts"] += int(after.simulations)
+        row["posterior after"] = posterior(better)
+        row |= {f"{name} after": value for name, value in measures(better).items()}
+        states["after"] = better, after.values()
+    row["seconds"] = round(time.monotonic() - began, 1)
     if case.open_loop:
-        row |= open_loop(study, fit.values(), found["effects"])
-    return row | {"machine": machine(), "versions": versions()}
+        row |= open_loop(states)
+    if case.picture:
+        PICTURES.mkdir(exist_ok=True)
+        (PICTURES / f"{case.slug}.png").write_bytes(overview_figure(study, better))
+    return row | {"machine": machine(), "versions": versions(), "commit": commit()}
 
 
-def open_loop(study: Study, fitted: Mapping[str, float], effects: list[str]) -> dict[str, Any]:
-    """:func:`absolute` of the middle of the prior, of the fit, and with what was named; on takes never used, too."""
-    space = study.problem.space
-    states = {"unfitted": (space.as_dict(space.from_unit(np.full(len(space), 0.5))), []), "fitted": (fitted, [])}
-    models = study.results()["diagnose"].attrs["models"]
-    for model in models:
-        if effects and model["effects"] in (effects, effects[:1]):
-            states["after"] = model["values"], model["effects"]
-            break
-    problems = {"open loop": study.problem, "never used": never_used(study)}
+def posterior(study: Study) -> dict[str, dict[str, float | str]]:
+    """Of every parameter the best fit, and the 5, 50 and 95 % quantiles of the posterior."""
+    fit = load_fit(study)
+    quantiles = np.quantile(fit.samples, [0.05, 0.5, 0.95], axis=0).T
     return {
-        f"{state} {which}": absolute(problem, values, added)
-        for which, problem in problems.items()
-        if problem is not None
-        for state, (values, added) in states.items()
+        name: {"best": float(best), "low": float(low), "median": float(middle), "high": float(high), "unit": unit}
+        for name, unit, best, (low, middle, high) in zip(fit.names, fit.units, fit.estimate, quantiles, strict=True)
     }
+
+
+def commit() -> str:
+    """Of the sources, with a plus sign if they were changed since; "unknown" outside a repository."""
+    asked = subprocess.run(
+        ["git", "-C", str(ROOT), "describe", "--always", "--exclude=*", "--dirty=+"], capture_output=True, text=True
+    )
+    return asked.stdout.strip() or "unknown"
 
 
 def rms(errors: list[float]) -> float:
@@ -146,22 +125,52 @@ def markdown(rows: list[dict[str, Any]], skipped: Mapping[str, str]) -> str:
         lines.append("| " + " | ".join([*cells, str(r["rollouts"]), f"{r['seconds']:.0f}"]) + " |")
     lines += ["", "Errors on held-out takes in mm, root mean square a coordinate.", ""]
     for r in rows:
+        lines += [line for line in (_of_posterior(r), _of_measures(r)) if line]
         for state in (f"{s} {w}" for w in ("open loop", "never used") for s in ("unfitted", "fitted", "after")):
             if (e := r.get(state)) is not None:
                 lines.append(
-                    f"- {r['set']}, {state.replace('never used', 'open loop on takes never used')}: median point error "
-                    f"{1e3 * e['median_point']:.1f} mm, mean absolute coordinate error "
-                    f"{1e3 * e['mean_coordinate']:.1f} mm{_of_takes(e)}"
+                    f"- {r['set']}, {state.replace('never used', 'open loop on takes never used')}: {_told(e)}"
                 )
     lines += [f"- skipped: {name}: {why}" for name, why in skipped.items()]
     return "\n".join(lines) + "\n"
 
 
-def _of_takes(e: Mapping[str, float]) -> str:
-    if "takes" not in e:
+def _of_posterior(row: Mapping[str, Any]) -> str:
+    known = row.get("posterior after") or row.get("posterior")
+    if not known:
         return ""
+    each = (
+        f"{name} {p['best']:.3g}{'' if p['unit'] == '1' else ' ' + p['unit']} ({p['low']:.3g} to {p['high']:.3g})"
+        for name, p in known.items()
+    )
+    return f"- {row['set']}: best fit (90 % of the posterior): {', '.join(each)}"
+
+
+def _of_measures(row: Mapping[str, Any]) -> str:
+    if "coverage" not in row:
+        return ""
+    each = [_measured(row, w) for w in ("", " after") if f"coverage{w}" in row]
+    return f"- {row['set']}, held out: {'; with what was named: '.join(each)}"
+
+
+def _measured(row: Mapping[str, Any], which: str) -> str:
+    low, high = (1e3 * x for x in row[f"mean_point_interval{which}"])
+    sheet = f"mean_surface{which}"
+    return (
+        f"mean point error {1e3 * row[f'mean_point{which}']:.1f} mm ({low:.1f} to {high:.1f}), "
+        + (f"{1e3 * row[sheet]:.1f} mm to the sheet, " if sheet in row else "")
+        + f"{1e3 * row[f'largest{which}']:.1f} mm in the worst frame; {100 * row[f'coverage{which}']:.0f} % of the "
+        "coordinates within the posterior's 90 % intervals"
+    )
+
+
+def _told(e: Mapping[str, Any]) -> str:
+    text = f"median point error {1e3 * e['median_point']:.1f} mm"
+    text += f", mean absolute coordinate error {1e3 * e['mean_coordinate']:.1f} mm"
+    if "takes" not in e:
+        return text
     failed = f", {e['failed']} more could not be simulated" if e["failed"] else ""
-    return f" ({1e3 * e['median_take']:.1f} mm in the median over {e['takes']} takes{failed})"
+    return f"{text} ({1e3 * e['median_take']:.1f} mm in the median over {e['takes']} takes{failed})"
 
 
 def main() -> None:

@@ -1,20 +1,22 @@
 """The real recordings of the benchmark: how each set becomes a study."""
 
+import re
 import runpy
 import shutil
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from muslin.core.dataset import DatasetNote, cropped
+from muslin.core.dataset import DatasetNote
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.registry import REGISTRY
 from muslin.core.study import Study, read_config, write_config
+from muslin.core.study.config import ParameterTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for when it is run as a script
 from published import DATA, ROOT
@@ -24,6 +26,9 @@ EXAMPLES = ROOT / "examples"
 #: Takes of a cable, fitted on and held out, all of their 5 s: spread evenly from that which starts slowest to that
 #: which starts fastest, alternately. The others are never used, and the error on them is told, too.
 CABLE_TAKES = (5, 4)
+
+#: Takes of the beam: that which is fitted, and those held out.
+BEAM_TAKES = ("gravity-b", "gravity-a", "load52-a", "load52-b", "load101-a", "load101-b")
 
 
 @dataclass(frozen=True)
@@ -35,12 +40,39 @@ class Case:
         needs: a file or folder that must be there.
         make: makes the study in an empty folder.
         open_loop: nothing of the measurement is taken out, so absolute errors can be compared with those of others.
+        picture: goes into the documentation.
     """
 
     name: str
     needs: Path
     make: Callable[[Path, int | None], Study]
     open_loop: bool = False
+    picture: bool = False
+
+    @property
+    def slug(self) -> str:
+        """The name for a file."""
+        return "-".join(re.findall(r"[a-z0-9]+", self.name.lower()))
+
+
+def on_pybullet(case: Case, *left_out: str, draws: int | None = None, simulations: int | None = None) -> Case:
+    """The same on the other engine, without the parameters ``left_out`` that it does not have.
+
+    Where its rollouts take long, fewer ``draws`` are fitted and fewer ``simulations`` diagnosed with.
+    """
+
+    def make(folder: Path, workers: int | None) -> Study:
+        study = case.make(folder, workers)
+        config = study.config.model_copy(deep=True)
+        config.simulator.name = "pybullet"
+        for name in left_out:
+            del config.parameters[name]
+        config.estimator.draws = draws or config.estimator.draws
+        config.diagnose.simulations = simulations or config.diagnose.simulations
+        write_config(config, study.path)
+        return Study.load(study.path, workers=workers)
+
+    return replace(case, name=f"{case.name}, PyBullet", make=make, picture=False)
 
 
 def takes_of(dataset: str, path: Path, takes: Sequence[str] = ()) -> list[Recording]:
@@ -61,7 +93,10 @@ def ball(name: str) -> Case:
 
 
 def beam(folder: Path, workers: int | None) -> Study:
-    shutil.copy(EXAMPLES / "beam/study.toml", folder)
+    """Fitted on one take without a load; its repeat and both loads are held out."""
+    config = read_config(EXAMPLES / "beam/study.toml")
+    config.study.fit_on, config.study.hold_out = list(BEAM_TAKES[:1]), list(BEAM_TAKES[1:])
+    write_config(config, folder / "study.toml")
     runpy.run_path(str(EXAMPLES / "demo.py"))["import_beam"](folder)
     return Study.load(folder / "study.toml", workers=workers)
 
@@ -91,17 +126,29 @@ def cable(number: int) -> Case:
         save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
         return Study.load(folder / "study.toml", workers=workers)
 
-    return Case(f"cable {number}", path, make, open_loop=True)
+    return Case(f"cable {number}", path, make, open_loop=True, picture=True)
 
 
 def carried_cloth(folder: Path, workers: int | None) -> Study:
-    """The first 4 s of every take, as the command in examples/carried_cloth/README.md imports them."""
+    """All takes of one day, of which the study fits three and holds three out."""
     config = read_config(EXAMPLES / "carried_cloth/study.toml")
-    used = [*(config.study.fit_on or []), *config.study.hold_out]
-    takes = [cropped(r, None, 4.0) for r in takes_of("carried-cloth", DATA / "cloth_carried", used)]
+    names = sorted(file.stem for file in (DATA / "cloth_carried").glob("2021_07_05_*.npz"))
     shutil.copy(EXAMPLES / "carried_cloth/study.toml", folder)
-    save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
+    save_measurement(
+        Measurement(tuple(takes_of("carried-cloth", DATA / "cloth_carried", names))), folder / config.study.measurement
+    )
     return Study.load(folder / "study.toml", workers=workers)
+
+
+def carried_in_air(folder: Path, workers: int | None) -> Study:
+    """The same with what the air does to a sheet, whatever a diagnosis says, and so stiff a cloth as it then takes."""
+    study = carried_cloth(folder, workers).add("air-drag").add("added-mass")
+    config = study.config.model_copy(deep=True)
+    config.parameters["bending_rigidity"] = ParameterTable(low=2e-6, high=5e-3, scale="log")
+    config.parameters["stretch_stiffness"] = ParameterTable(low=30.0, high=3000.0, scale="log")
+    config.diagnose.simulations = 400
+    write_config(config, study.path)
+    return Study.load(study.path, workers=workers)
 
 
 def cloud(motion: str, sheet: str) -> Case:
@@ -116,13 +163,18 @@ def cloud(motion: str, sheet: str) -> Case:
         write_config(config, folder / "study.toml")
         return Study.load(folder / "study.toml", workers=workers)
 
-    return Case(f"cloud: {motion} {sheet}", DATA / "cloth_cloud", make)
+    return Case(f"cloud: {motion} {sheet}", DATA / "cloth_cloud", make, picture=sheet == "paper")
 
 
+BEAM = Case("beam", EXAMPLES / "beam/data", beam)
+CABLES = [cable(number) for number in (1, 2, 3)]
+CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth, picture=True)
+IN_AIR = Case("carried cloth, air", DATA / "cloth_carried", carried_in_air, picture=True)
 CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
-    Case("beam", EXAMPLES / "beam/data", beam),
-    *(cable(number) for number in (1, 2, 3)),
-    Case("carried cloth", DATA / "cloth_carried", carried_cloth, open_loop=True),
+    *(BEAM, replace(on_pybullet(BEAM), picture=True)),
+    *CABLES,
+    *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
+    *(CARRIED, IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]
