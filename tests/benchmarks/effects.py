@@ -33,7 +33,7 @@ from effects_bench.cases import BLOCK, FIRST_SEEDS, Case, plan
 from effects_bench.running import Plan, run_case
 from effects_bench.settings import SETTINGS
 from effects_bench.table import as_json, figures, markdown
-from table import RESULTS, machine, versions
+from table import RESULTS, commit, machine, versions
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Whose sources a case depends on.
@@ -121,6 +121,7 @@ def main() -> None:
     content = {
         "machine": machine(),
         "versions": versions(),
+        "commit": commit(),
         "part": a.part,
         "seeds": [r["case"]["seed"] for r in records],
         "seconds": round(time.monotonic() - began, 1),

@@ -8,7 +8,6 @@ skipped where it has none::
 
 import argparse
 import json
-import subprocess
 import tempfile
 import time
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from typing import Any
 import numpy as np
 from real_cases import CASES, ROOT, Case
 from real_measures import measures, open_loop
-from table import RESULTS, machine, versions
+from table import RESULTS, commit, machine, versions
 
 from muslin.cli.report import overview_figure
 from muslin.core.study import Study
@@ -87,14 +86,6 @@ def posterior(study: Study) -> dict[str, dict[str, float | str]]:
         name: {"best": float(best), "low": float(low), "median": float(middle), "high": float(high), "unit": unit}
         for name, unit, best, (low, middle, high) in zip(fit.names, fit.units, fit.estimate, quantiles, strict=True)
     }
-
-
-def commit() -> str:
-    """Of the sources, with a plus sign if they were changed since; "unknown" outside a repository."""
-    asked = subprocess.run(
-        ["git", "-C", str(ROOT), "describe", "--always", "--exclude=*", "--dirty=+"], capture_output=True, text=True
-    )
-    return asked.stdout.strip() or "unknown"
 
 
 def rms(errors: list[float]) -> float:

@@ -3,6 +3,7 @@
 import json
 import os
 import platform
+import subprocess
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -41,6 +42,16 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             out[name] = "not installed"
     return out
+
+
+def commit() -> str:
+    """Of the sources, with a plus sign if they were changed since; "unknown" outside a repository."""
+    asked = subprocess.run(
+        ["git", "-C", str(RESULTS.parent), "describe", "--always", "--exclude=*", "--dirty=+"],
+        capture_output=True,
+        text=True,
+    )
+    return asked.stdout.strip() or "unknown"
 
 
 def report(name: str, rows: Sequence[Row], seeds: Sequence[int], seconds: float) -> Path:
