@@ -13,6 +13,7 @@ from ...core.measurement import Recording
 from ...core.motion import Motion, inverse, multiply, rotate
 from ...core.series import PointSeries
 from .carried_turns import carried_turns
+from .grid_faults import lost_cloth
 
 #: Orientation of the hand, w x y z, in which the cloth hangs in the x-z plane, its columns from low to high x.
 HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
@@ -32,7 +33,7 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
     in the hand is the median over the recording, in which a constant offset between camera and robot goes too. The
     camera's clock lags the robot's; the lag is the one at which the top edge moves most like the hand, and points are
     given on the robot's clock; where the hand rests, the lag is taken for 0. Without ``tcp`` the tracked top edge
-    itself is the gripper.
+    itself is the gripper. Frames in which the tracker lost the cloth (:mod:`.grid_faults`) are left out.
 
     Takes with names alike are not marked as repeats: the robot did not start them at one moment, nor on one path.
 
@@ -54,7 +55,13 @@ def _recording(path: Path, name: str) -> Recording:
     time = shaped(data["t"], (len(mesh),), "t", path)
     if mesh.shape[1] != mesh.shape[2] or mesh.shape[1] < 2:
         raise InputError(f"{path}: mesh must be (T, n, n, 3) with n from 2 up, but is {mesh.shape}")
-    points = mesh[:, :, ::-1].transpose(0, 2, 1, 3).reshape(len(mesh), -1, 3)
+    grid = np.where(np.isfinite(mesh), mesh, np.nan)[:, :, ::-1].transpose(0, 2, 1, 3)
+    lost = lost_cloth(grid)
+    if lost.any():
+        note(
+            f"{name}: {int(lost.sum())} of {len(lost)} frames left out, in which the grid is too short to be the cloth"
+        )
+    time, points = time[~lost], grid[~lost].reshape(int(np.sum(~lost)), -1, 3)
     top = points[:, : mesh.shape[1]]
     whole = np.isfinite(top).all(axis=(1, 2))
     if whole.sum() < 10:

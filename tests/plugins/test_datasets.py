@@ -190,6 +190,26 @@ def test_the_gripper_of_a_carried_cloth_is_its_top_edge(tmp_path: Path) -> None:
     np.testing.assert_allclose(down, sheet, atol=0.005)  # it hangs where the hand points
 
 
+@pytest.mark.parametrize("axis", [1, 2])
+def test_frames_in_which_the_tracker_lost_a_cloth_are_left_out(tmp_path: Path, axis: int) -> None:
+    made = carried(0.31, (0.0, 0.0, 0.0))
+    mesh = made["mesh"]
+    squeezed = [7, 8, 30]
+    middle = mesh[squeezed].mean(axis=axis, keepdims=True)
+    mesh[squeezed] = middle + 0.85 * (mesh[squeezed] - middle)
+    mesh[12, 2, 2] = np.nan  # what is not seen is not short
+    # rolled to a tube of radius 1.5 spacings, a cloth is as long as ever
+    angle = np.linspace(-1.0, 1.0, 5) * 2 / 1.5
+    mesh[20, ..., 1] += np.broadcast_to(1.5 * 0.075 * np.cos(angle), (5, 5))
+    mesh[20, ..., 2] = mesh[20, ..., 2].mean() + 1.5 * 0.075 * np.sin(angle)
+    np.savez(tmp_path / "a.npz", **made)
+    (take,), notes = read("carried-cloth", tmp_path)
+    kept = np.setdiff1d(np.arange(50), squeezed)
+    assert "3 of 50 frames left out, in which the grid is too short to be the cloth" in notes[0]
+    np.testing.assert_allclose(take.series.time, made["t"][kept] - 0.31, atol=0.01)
+    assert take.series.points.shape == (47, 25, 3) and np.isnan(take.series.points).any(axis=2).sum() == 1
+
+
 def test_without_a_hand_the_tracked_edge_carries(tmp_path: Path) -> None:
     made = carried(0.0, (0.0, 0.0, 0.0))
     made["mesh"][7, 0, -1] = np.nan
