@@ -1,5 +1,6 @@
 """The examples: their studies resolve, and the recording in the repository is what its script makes."""
 
+import os
 import runpy
 import shutil
 import subprocess
@@ -76,6 +77,31 @@ def test_the_shirt_is_what_its_script_makes_and_swings(
     assert len(scenario.grasps) == 1 and len(scenario.grasps[0]) == 6  # the seams of both shoulders
     np.testing.assert_allclose(study.measurement["swing"].series.points[0, scenario.grasps[0], 2], 1.0, atol=1e-6)
     study.problem.simulator.check(scenario.scene(study.problem.material, np.array([0.0, 0.0, -9.8])))
+
+
+def recordings(*arguments: str, data: str = "") -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, str(EXAMPLES / "recordings.py"), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, env={**os.environ, "MUSLIN_DATA": data})
+
+
+def test_recordings_that_are_not_there_are_one_line(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    for done, said in (
+        (recordings("cable", "-o", out), "set MUSLIN_DATA to the folder that it is in"),
+        (recordings("carried_cloth", "-o", out, data=str(tmp_path)), f"there is no {tmp_path / 'cloth_carried'}"),
+        (recordings("balls", "--study", "rugby.toml", "-o", out), "there is no rugby.toml"),
+        (recordings("balls", "-o", str(tmp_path)), "is there already; remove it"),
+    ):
+        assert done.returncode == 1 and said in done.stderr and "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.slow
+def test_recordings_become_a_report(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    done = recordings("balls", "--study", "bowling.toml", "-o", str(tmp_path / "out"))
+    assert done.returncode == 0, done.stderr
+    assert "$ muslin import" in done.stdout and (tmp_path / "out/report.html").stat().st_size > 10_000
 
 
 @pytest.mark.slow
