@@ -138,6 +138,8 @@ def rollout(
     if is_askew:
         vertices, poses = rotate(askew, vertices), turned(askew, poses)
     points: FloatArray = scenario.markers @ vertices
+    if scenario.beside is not None:
+        points = points + scenario.beside.shifts(vertices, poses, scenario.markers)
     for effect in active:
         points = effect.on_points(points)
     return Trajectory(PointSeries(scenario.times, points), vertices, poses, time.monotonic() - started)

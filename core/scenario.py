@@ -7,6 +7,7 @@ from typing import TypeAlias, cast
 import numpy as np
 
 from .arrays import FloatArray, IntArray
+from .beside import Beside
 from .body import Body
 from .camera import Camera
 from .errors import InputError
@@ -67,6 +68,7 @@ class Scenario:
         camera: that looks at it, or None where it is not known.
         unit: of what is measured: "px" of that camera, or "m" in the world.
         sampled: the markers are places spread over the object, not spots that are marked on it.
+        beside: how far the markers of a rope between two grippers stand beside its axis; None: they sit on it.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Scenario:
     camera: Camera | None = None
     unit: PointUnit = "m"
     sampled: bool = False
+    beside: Beside | None = None
 
     def __post_init__(self) -> None:
         count = len(self.body.vertices)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
+from ..beside import Beside
 from ..body import rope_line
 from ..differences import fourth_differences, robust_sd
 from ..errors import InputError
@@ -31,14 +32,15 @@ _FEWEST, _LONGEST = 5, 0.3
 _WITHIN = 1.5
 
 
-def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
+def measured_start(scenario: Scenario, recording: Recording, beside: Beside | None = None) -> Scenario:
     """The scenario of a rope whose markers, in their order along it, reach from its first vertex to its last.
 
     In its rest shape it is straight and as long as the curve through the markers of the first frame (a natural cubic
     spline over the chords), along which every marker keeps its place. Length and so mass (at one linear density) are
     therefore those of this take: takes of one cable differ by as much as their markers are off. It is not given time to
     settle, which would take it away from where it was seen, and starts with the velocity of its markers, told by
-    parabolas through their first frames: see :func:`first_motion`.
+    parabolas through their first frames: see :func:`first_motion`. Of markers that stand ``beside`` the axis all this
+    is told of the places on the axis.
 
     Raises:
         InputError: not a rope, not x, y and z in metres, or a marker is not seen in the first frame.
@@ -46,11 +48,18 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     check_spatial(recording)
     if scenario.body.kind != "rope" or not recording.series.correspondence:
         raise InputError(f"recording {recording.name!r}: only a rope with markers in order starts as measured")
-    points = recording.series.points[0]
+    series = recording.series
+    points = series.points[0]
     if len(points) < 3 or not np.isfinite(points).all():
         raise InputError(
             f"recording {recording.name!r}: every marker must be seen in the first frame, at least 3; start it later"
         )
+    if beside is not None:
+        early = series.time - series.time[0] <= _LONGEST
+        early[:_FEWEST] = True
+        time = series.time[early]
+        series = PointSeries(time, beside.axis(series.points[early], scenario.motion.at(time)))
+        points = series.points[0]
     curve, along, places = _curve(points)
     count = len(scenario.body.vertices)
     body = rope_line(np.array([[0.0, 0.0, 0.0], [along[-1], 0.0, 0.0]]), count)
@@ -64,8 +73,8 @@ def measured_start(scenario: Scenario, recording: Recording) -> Scenario:
     evenly = np.linspace(0.0, along[-1], len(along))
     local = np.stack([np.interp(evenly, along, local[:, k]) for k in range(3)], axis=1)
     start = GivenShape(local, along[-1], np.zeros(3))
-    motion = first_motion(recording.series, places)
-    return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion)
+    motion = first_motion(series, places)
+    return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion, beside=beside)
 
 
 def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..beside import Beside
 from ..body import Body, rope_line
 from ..errors import InputError
 from ..importing.mesh import read_body
@@ -49,7 +50,9 @@ def obstacles_of(table: ScenarioTable, folder: Path) -> tuple[Obstacle, ...]:
     return tuple(o.build(folder) for o in table.obstacles)
 
 
-def build_scenario(table: ScenarioTable, recording: Recording, folder: Path, marked: bool = True) -> Scenario:
+def build_scenario(
+    table: ScenarioTable, recording: Recording, folder: Path, marked: bool = True, beside: Beside | None = None
+) -> Scenario:
     """The scenario of one recording.
 
     Args:
@@ -57,6 +60,7 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path, mar
         recording: what happened.
         folder: of the study file.
         marked: points are markers, each with a place on the object; not those that are found in pictures.
+        beside: how far the markers stand beside a rope that starts as measured.
 
     Raises:
         InputError: something in the table cannot be, or does not go with the recording.
@@ -85,7 +89,7 @@ def build_scenario(table: ScenarioTable, recording: Recording, folder: Path, mar
     ).for_recording(recording)
     check_comparable(recording)
     if table.start == "measured":
-        return measured_start(plain, recording)
+        return measured_start(plain, recording, beside)
     if not marked:
         return plain
     return replace(plain, markers=_markers(table.markers, plain, recording), sampled=table.markers == "surface")

@@ -22,6 +22,7 @@ from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
+from ..scenarios.standoffs import told_standoffs
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
@@ -140,7 +141,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
             f"[extractor]: {config.extractor.name!r} has not learned yet; name the file that muslin train wrote: "
             "weights = FILE"
         )
-    scenarios = {n: build_scenario(config.scenario, r, folder, extractor.uses_markers) for n, r in recordings.items()}
+    marked, beside = extractor.uses_markers, None
+    if config.scenario.markers == "beside":  # held-out recordings must not tell
+        beside = told_standoffs([recordings[n] for n in fit_on])
+    scenarios = {n: build_scenario(config.scenario, r, folder, marked, beside) for n, r in recordings.items()}
     kind = scenarios[fit_on[0]].body.kind
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}

@@ -72,7 +72,9 @@ class ScenarioTable(StrictTable):
     in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
     first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
     as it stands in the world at the start. ``start = "measured"`` lets a rope start through the markers of the first
-    frame, at once, and says where they are on it: its length, and so its mass, follow from each take.
+    frame, at once, and says where they are on it: its length, and so its mass, follow from each take. With
+    ``markers = "beside"`` these stand beside the axis of the rope, see
+    :func:`~muslin.core.scenarios.standoffs.told_standoffs`.
     """
 
     name: str
@@ -87,7 +89,7 @@ class ScenarioTable(StrictTable):
     grasp_points: list[Point | list[Point]] | None = None
     grasp_radius: float = Field(default=0.0, ge=0)
     start: Literal["measured"] | None = None
-    markers: list[int] | Literal["all", "bound", "surface"] | None = None
+    markers: list[int] | Literal["all", "bound", "surface", "beside"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
     obstacles: list[ObstacleTable] | None = None
@@ -118,13 +120,16 @@ class ScenarioTable(StrictTable):
             raise ValueError("grasps and grasp_points both say what is held; keep one of them")
         if self.start is not None:
             self._only_measured()
+        elif self.markers == "beside":
+            raise ValueError("markers = 'beside' is for a rope that starts as measured; add start = 'measured'")
         if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
             raise ValueError("grasp_radius goes with grasp_points, which are missing")
         return self
 
     def _only_measured(self) -> None:
         """What the first frame tells is not told here too: it would be ignored."""
-        told = [k for k in ("mesh", "size", "markers") if getattr(self, k) is not None]
+        told = [k for k in ("mesh", "size") if getattr(self, k) is not None]
+        told += ["markers"] if self.markers not in (None, "beside") else []
         told += ["frame"] if self.frame != "gripper" else []
         if told:
             raise ValueError(

@@ -3,24 +3,31 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
+from ...core.errors import InputError
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
-from ...core.study import SimulationPool, Task
+from ...core.scenarios.standoffs import told_standoffs
+from ...core.study import Problem, SimulationPool, Task
 from ..noise import Noise
 from ..residuals import rms_apart
 from ..roughness import Roughness, roughness, unrepeatable
 
 #: A step that moves the model by more than this is told of [noise standard deviations].
 STEP_MATTERS = 1.0
+#: Markers that stand further beside the axis of a rope than this are told of, root mean square [m].
+BESIDE_MATTERS = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
     """Sentences for people; empty if nothing is doubtful.
 
     What a rollout does by chance tells nothing of the parameters. A motion that is rough at the frame rate passes for
-    noise where the noise is estimated from roughness. What the time step does passes for the material's doing.
+    noise where the noise is estimated from roughness. What the time step does passes for the material's doing. Markers
+    beside the axis of a rope let it seem longer or shorter than it is, as it is bent.
     """
     problem = pool.problem
     values = space.as_dict(space.from_unit(unit))
@@ -41,6 +48,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
         )
     out += step_matters(pool, values, plain, rough, noise)
+    out += markers_beside(problem)
     if noise.source.startswith("roughness"):
         own = robust_sd(fourth_differences(plain[problem.fit_on[0]].series.points))
         if own > 0.5 * noise.sd:
@@ -82,4 +90,22 @@ def step_matters(
     return [
         f"half the time step moves the model by {size}, {changed / noise.sd:.2g} times the noise: what the step does "
         "passes for the material's doing or for a misfit; lower [simulator] time_step until that no longer counts"
+    ]
+
+
+def markers_beside(problem: Problem) -> list[str]:
+    """That markers stand beside the axis, in a sentence, where a rope that starts as measured has them on it."""
+    scenarios = [problem.scenarios[name] for name in problem.fit_on]
+    if any(s.start_motion is None or s.beside is not None for s in scenarios):
+        return []
+    try:
+        offsets = told_standoffs([problem.recordings[name] for name in problem.fit_on]).offsets
+    except InputError:
+        return []  # these recordings do not tell
+    away = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
+    if away <= BESIDE_MATTERS:
+        return []
+    return [
+        f"the distances between markers change as the rope bends as if these stood {1e3 * away:.2g} mm beside its "
+        'axis; [scenario] markers = "beside" takes them to be there'
     ]

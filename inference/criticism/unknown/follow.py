@@ -34,7 +34,10 @@ def make_aim(recording: Recording, scenario: Scenario, basis: Basis) -> Aim | No
     series = recording.series
     if not series.correspondence or series.unit != "m" or series.points.shape[2] != 3:
         return None
-    seen = series.valid
+    points = series.points
+    if scenario.beside is not None:
+        points = scenario.beside.axis(points, scenario.motion.at(series.time))
+    seen = np.asarray(np.isfinite(points).all(axis=2))
     good = np.flatnonzero((seen.sum(axis=0) >= FEWEST_FRAMES) & (2 * seen.sum(axis=0) >= series.frames))
     if not len(good):
         return None
@@ -43,7 +46,7 @@ def make_aim(recording: Recording, scenario: Scenario, basis: Basis) -> Aim | No
     for k, marker in enumerate(good):
         when = series.time[seen[:, marker]]
         for axis in range(3):
-            spline = CubicSpline(when, series.points[seen[:, marker], marker, axis])
+            spline = CubicSpline(when, points[seen[:, marker], marker, axis])
             inside = np.clip(times, when[0], when[-1])
             places[:, k, axis] = spline(inside)
             speeds[:, k, axis] = np.where(inside == times, spline(inside, 1), 0.0)

@@ -1,0 +1,135 @@
+"""Markers that stand beside the axis of a rope, and turn with its material."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .motion import rotate
+
+#: How often the place of the axis is told anew from the markers and their frames.
+_ROUNDS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Where markers stand, in the cross-sections of a rope that two grippers hold.
+
+    A cross-section has the axes of :func:`rope_frames`: the first is the z axis of the first gripper, carried along.
+
+    Args:
+        offsets: of the markers from the axis of the rope ``(M, 2)`` [m].
+        turn: angle of the second gripper's z axis, seen from the first one's that was carried along, where the rope is
+            not twisted [rad].
+    """
+
+    offsets: FloatArray
+    turn: float
+
+    def shifts(self, vertices: FloatArray, poses: FloatArray, markers: FloatArray) -> FloatArray:
+        """What takes the markers ``(T, M, 3)`` [m] from the axis to where they stand.
+
+        Args:
+            vertices: of the rope, in order ``(T, V, 3)`` [m].
+            poses: of both grippers ``(T, 2, 7)``.
+            markers: weights ``(M, V)`` of their places on the axis.
+        """
+        frames = rope_frames(vertices, poses, self.turn)
+        return np.asarray(np.einsum("ma,mv,tvax->tmx", self.offsets, markers, frames))
+
+    def axis(self, points: FloatArray, poses: FloatArray) -> FloatArray:
+        """Places on the axis ``(T, M, 3)`` [m] of markers seen at ``points (T, M, 3)`` [m].
+
+        NaN in frames that do not show every marker: nothing tells then how the rope lies.
+        """
+        whole = np.isfinite(points).all(axis=(1, 2))
+        out = np.full(points.shape, np.nan)
+        found = seen = points[whole]
+        for _ in range(_ROUNDS if len(seen) else 0):
+            found = seen - np.einsum("ma,tmax->tmx", self.offsets, frames_at(found, poses[whole], self.turn))
+        out[whole] = found
+        return out
+
+
+def frames_at(points: FloatArray, poses: FloatArray, turn: float) -> FloatArray:
+    """:func:`rope_frames` ``(T, M, 2, 3)`` at ``points (T, M, 3)`` of a rope, on the smooth curves through them."""
+    curve, places = curves(points)
+    return rope_frames(curve, poses, turn)[:, places]
+
+
+def rope_frames(curve: FloatArray, poses: FloatArray, turn: float) -> FloatArray:
+    r"""Two axes of the cross-section at every vertex of a rope ``(T, V, 2, 3)``, normal to it and to each other.
+
+    At the first vertex the first axis is the z axis of the first gripper, at the last that of the second one, turned
+    back by ``turn``. In between the frame is carried along without twist (Bishop 1975), and what the grippers twist the
+    rope by, :math:`\theta`, is spread evenly: at the length s of L it is :math:`\theta s / L`, as of a uniform rod
+    whose twist has settled (Bergou et al., *Discrete elastic rods*, 2008). From frame to frame it does not jump.
+
+    Args:
+        curve: vertices in order ``(T, V, 3)`` [m], neighbours apart.
+        poses: of the grippers at the first and the last ``(T, 2, 7)``.
+        turn: see :class:`Beside` [rad].
+    """
+    carried, beside, share, angle = _carried(curve, poses)
+    angle = np.unwrap(angle - turn)
+    angle -= 2 * np.pi * np.round(angle[0] / (2 * np.pi))
+    twist = (angle[:, None] * share)[..., None]
+    turned = (np.cos(twist) * carried + np.sin(twist) * beside, np.cos(twist) * beside - np.sin(twist) * carried)
+    return np.stack(turned, axis=2)
+
+
+def closing_angles(curve: FloatArray, poses: FloatArray) -> FloatArray:
+    """Angles ``(T,)`` [rad] from the first gripper's z axis, carried along without twist, to that of the second one."""
+    return _carried(curve, poses)[3]
+
+
+def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Both axes without twist ``(T, V, 3)``, shares of the length ``(T, V)``, and what closes the frame at the end."""
+    segments = np.diff(curve, axis=1)
+    lengths = np.linalg.norm(segments, axis=2)
+    along = segments / lengths[..., None]
+    tangents = _unit(np.concatenate([along[:, :1], along[:, 1:] + along[:, :-1], along[:, -1:]], axis=1))
+    up = np.array([0.0, 0.0, 1.0])
+    first, last = (rotate(poses[:, g, 3:], np.broadcast_to(up, (len(poses), 3))) for g in (0, 1))
+    carried = np.empty_like(tangents)
+    carried[:, 0] = _across(first, tangents[:, 0])
+    for k in range(1, tangents.shape[1]):
+        old, new, axis = tangents[:, k - 1], tangents[:, k], carried[:, k - 1]
+        bend = np.sum(axis * new, axis=1) / np.maximum(1.0 + np.sum(old * new, axis=1), 1e-9)
+        carried[:, k] = _across(axis - bend[:, None] * (old + new), new)
+    beside = np.cross(tangents, carried)
+    wanted = _across(last, tangents[:, -1])
+    angle = np.arctan2(np.sum(wanted * beside[:, -1], axis=1), np.sum(wanted * carried[:, -1], axis=1))
+    so_far = np.concatenate([np.zeros((len(curve), 1)), np.cumsum(lengths, axis=1)], axis=1)
+    return carried, beside, so_far / so_far[:, -1:], angle
+
+
+def curves(points: FloatArray, fine: int = 12) -> tuple[FloatArray, IntArray]:
+    """Natural cubic splines through ``points (T, M, 3)``, ``fine`` steps from one to the next, over the mean chords.
+
+    Returns:
+        The curves ``(T, (M - 1) fine + 1, 3)`` and the numbers ``(M,)`` of their vertices that are the points.
+    """
+    count = points.shape[1]
+    chords = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(axis=0)
+    slopes = np.diff(points, axis=1) / chords[:, None]
+    matrix, right = np.eye(count), np.zeros(points.shape)
+    for k in range(1, count - 1):  # second derivatives: the slopes on both sides of every inner point agree
+        matrix[k, k - 1 : k + 2] = chords[k - 1], 2 * (chords[k - 1] + chords[k]), chords[k]
+        right[:, k] = 6 * (slopes[:, k] - slopes[:, k - 1])
+    bends = np.einsum("kl,tlx->tkx", np.linalg.inv(matrix), right)
+    u = (np.arange(fine) / fine)[:, None]
+    parts = []
+    for k, h in enumerate(chords):
+        ends = [v[:, None] for v in (points[:, k], points[:, k + 1], bends[:, k], bends[:, k + 1])]
+        line = (1 - u) * ends[0] + u * ends[1]
+        parts.append(line + h**2 / 6 * (((1 - u) ** 3 - (1 - u)) * ends[2] + (u**3 - u) * ends[3]))
+    return np.concatenate([*parts, points[:, -1:]], axis=1), fine * np.arange(count, dtype=np.int64)
+
+
+def _across(vectors: FloatArray, tangents: FloatArray) -> FloatArray:
+    return _unit(vectors - np.sum(vectors * tangents, axis=1, keepdims=True) * tangents)
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
