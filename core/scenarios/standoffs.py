@@ -40,6 +40,10 @@ def told_standoffs(recordings: Sequence[Recording]) -> Beside:
             f"{', '.join(r.name for r in recordings)} only {sum(len(p) for p, _ in used)} do, {_APART:g} s apart; at "
             f"least {_FEWEST} are needed: leave it out, or fit on more recordings"
         )
+    counts = {r.name: r.series.points.shape[1] for r in recordings}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{name} has {count}" for name, count in counts.items())
+        raise InputError(f"[scenario.markers] = 'beside' is for recordings of the same markers, but {told}")
     count = used[0][0].shape[1]
     used = [(points, poses) for points, poses in used if len(points)]
     found = Beside(np.zeros((count, 2)), _turn(used))
@@ -49,7 +53,7 @@ def told_standoffs(recordings: Sequence[Recording]) -> Beside:
 
 
 def _frames(recording: Recording) -> tuple[FloatArray, FloatArray]:
-    """Points ``(T, M, 3)`` and poses ``(T, 2, 7)`` of frames that show every marker."""
+    """Points ``(T, M, 3)`` and poses ``(T, 2, 7)`` of frames that show every marker, neighbours apart."""
     check_spatial(recording)
     series, motion = recording.series, recording.gripper
     if not series.correspondence or series.points.shape[1] < 4 or motion is None or motion.grippers != 2:
@@ -57,7 +61,8 @@ def _frames(recording: Recording) -> tuple[FloatArray, FloatArray]:
             f"[scenario.markers] = 'beside' is for ropes with at least 4 markers in order between two grippers, but "
             f"recording {recording.name!r} is another"
         )
-    whole = np.flatnonzero(np.isfinite(series.points).all(axis=(1, 2)))
+    apart = np.linalg.norm(np.diff(series.points, axis=1), axis=2)
+    whole = np.flatnonzero((apart > 0).all(axis=1))  # a comparison with NaN is false
     late = np.floor((series.time[whole] - series.time[0]) / _APART)
     kept = whole[np.unique(late, return_index=True)[1]]
     return series.points[kept], motion.at(series.time[kept])

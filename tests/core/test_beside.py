@@ -133,6 +133,13 @@ def test_bends_tell_where_markers_stand(turn: float) -> None:
     assert np.sqrt(np.mean((found.offsets - true) ** 2)) < 0.004  # of 10 mm
 
 
+def test_a_frame_with_two_markers_at_one_place_tells_nothing() -> None:
+    take, true = recording(6, offsets(2)), offsets(2)
+    take.series.points[20, 5] = take.series.points[20, 4]
+    found = told_standoffs([take, recording(7, true)])
+    assert np.sqrt(np.mean((found.offsets - true) ** 2)) < 0.004
+
+
 def test_markers_on_the_axis_are_told_to_be_there() -> None:
     found = told_standoffs([recording(k, np.zeros((len(PLACES), 2)), noise=1e-4) for k in (6, 7)])
     assert np.abs(found.offsets).max() < 0.002
@@ -143,6 +150,9 @@ def test_what_does_not_tell_is_refused() -> None:
     few = Recording("few", PointSeries(take.series.time[:9], take.series.points[:9]), take.gripper)
     with pytest.raises(InputError, match=r"of few only 9 do, 0\.1 s apart; at least 20 are needed"):
         told_standoffs([few])
+    fewer = Recording("fewer", PointSeries(take.series.time, take.series.points[:, 1:]), take.gripper)
+    with pytest.raises(InputError, match="of the same markers, but take6 has 13, fewer has 12"):
+        told_standoffs([take, fewer])
     assert take.gripper is not None
     one = Motion(take.gripper.times, take.gripper.poses[:, :1])
     with pytest.raises(InputError, match=r"between two grippers, but recording 'one' is another"):
