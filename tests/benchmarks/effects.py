@@ -11,18 +11,15 @@ Held out is a motion of a type that was never fitted. See ``effects_bench/cases.
     make bench-effects EFFECTS="--part test --cases 400"   # on seeds that nothing was improved on
 
 Cases come in an order of which any first part is a fair share. A run that is stopped goes on where it was: finished
-cases are kept in ``OUTPUT.cells.partial``, unless muslin or what makes the cases has changed.
+cases and the answers of baselines are kept in ``OUTPUT.cells.partial``, unless muslin or what makes them has changed.
+So a first run may leave the baselines out (``--baselines`` with no name), and a later one ask them.
 """
 
 import argparse
-import hashlib
 import itertools
 import json
-import multiprocessing as mp
 import os
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -30,16 +27,10 @@ os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1", OPENBLAS_NUM_THREADS
 
 from effects_bench.baselines import BASELINES
 from effects_bench.cases import BLOCK, FIRST_SEEDS, Case, plan
-from effects_bench.running import Plan, run_case
+from effects_bench.run import Run
 from effects_bench.settings import SETTINGS
 from effects_bench.table import as_json, figures, markdown
 from table import RESULTS, commit, machine, versions
-
-ROOT = Path(__file__).resolve().parents[2]
-#: Whose sources a case depends on.
-ROOMS = ("core", "backends", "inference", "plugins")
-#: What only reads finished cases.
-READERS = ("scoring.py", "table.py")
 
 
 def parsed() -> argparse.Namespace:
@@ -57,45 +48,6 @@ def parsed() -> argparse.Namespace:
     return parser.parse_args()
 
 
-class Kept:
-    """Finished cases in a file, one a line; other sources or another plan, other keys."""
-
-    def __init__(self, path: Path, made_of: object) -> None:
-        self.path, self._made_of = path, made_of
-        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-        self._found = {key: record for key, record in map(_line, lines) if key}
-
-    def _key(self, case: Case) -> str:
-        text = json.dumps([self._made_of, case.as_dict()], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:24]
-
-    def get(self, case: Case) -> dict[str, Any] | None:
-        return self._found.get(self._key(case))
-
-    def add(self, case: Case, record: dict[str, Any]) -> None:
-        line = json.dumps({"key": self._key(case), "record": record})
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
-
-
-def _line(text: str) -> tuple[str, dict[str, Any]]:
-    """Key and record; no key of a line that a killed run has left half-written."""
-    try:
-        read = json.loads(text)
-        return str(read["key"]), read["record"]
-    except (ValueError, KeyError, TypeError):
-        return "", {}
-
-
-def sources() -> str:
-    """A hash of all that a finished case depends on."""
-    digest = hashlib.sha256()
-    bench = [p for p in (Path(__file__).parent / "effects_bench").rglob("*.py") if p.name not in READERS]
-    for source in sorted([*bench, *(p for room in ROOMS for p in (ROOT / room).rglob("*.py"))]):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def chosen(part: str, count: int, settings: list[str], kinds: list[str]) -> list[Case]:
     """The first cases of a part that are of these settings and kinds."""
     cases = (c for c in plan(part) if c.setting in settings and c.kind in kinds)
@@ -104,18 +56,17 @@ def chosen(part: str, count: int, settings: list[str], kinds: list[str]) -> list
 
 def main() -> None:
     a = parsed()
-    how = Plan(a.workers, tuple(a.baselines), a.draws)
     a.output.parent.mkdir(parents=True, exist_ok=True)
-    kept = Kept(a.output.with_suffix(".cells.partial"), [sources(), how.baselines, how.draws])
-    cache = a.output.with_suffix(".draws.partial")
-    began, found = time.monotonic(), {}
+    found, deadline = {}, time.monotonic() + 60 * a.minutes
     cases = chosen(a.part, a.cases, a.settings, a.kinds)
-    for number, record in finished(cases, kept, how, cache, a.at_once, began + 60 * a.minutes):
+    kept, cache = (a.output.with_suffix(f".{what}.partial") for what in ("cells", "draws"))
+    run = Run(kept, cache, a.workers, tuple(a.baselines), a.draws)
+    for number, record in run.finished(cases, a.at_once, deadline):
         found[number] = record
         print(f"{number + 1:4d} {told(record)}", flush=True)
     records = [found[number] for number in sorted(found)]
-    rows = figures(records, how.baselines)
-    table = markdown(rows, how.baselines)
+    rows = figures(records, a.baselines)
+    table = markdown(rows, a.baselines)
     left_out = sum("left_out" in r for r in records)
     about = f"{len(records)} of {len(cases)} {a.part} cases, of which {left_out} could not be generated; {machine()}\n"
     content = {
@@ -124,33 +75,12 @@ def main() -> None:
         "commit": commit(),
         "part": a.part,
         "seeds": [r["case"]["seed"] for r in records],
-        "seconds": round(time.monotonic() - began, 1),
         "figures": as_json(rows),
         "cases": [short(r) for r in records],
     }
     a.output.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     a.output.with_suffix(".md").write_text(f"{about}\n{table}", encoding="utf-8")
     print(f"\n{about}\n{table}\nwrote {a.output} and {a.output.with_suffix('.md')}")
-
-
-def finished(
-    cases: Sequence[Case], kept: Kept, how: Plan, cache: Path, at_once: int, deadline: float
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Index and record of the cases that are kept, then of those that can start before ``deadline``, as they end."""
-    known = {number: record for number, case in enumerate(cases) if (record := kept.get(case)) is not None}
-    yield from known.items()
-    left = iter([number for number in range(len(cases)) if number not in known])
-    running: dict[Future[dict[str, Any]], int] = {}
-    with ProcessPoolExecutor(at_once, mp_context=mp.get_context("spawn")) as pool:
-        while True:
-            while len(running) < at_once and time.monotonic() < deadline and (number := next(left, None)) is not None:
-                running[pool.submit(run_case, cases[number], how, cache)] = number
-            if not running:
-                return
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                number = running.pop(future)
-                kept.add(cases[number], future.result())
-                yield number, future.result()
 
 
 def short(record: dict[str, Any]) -> dict[str, Any]:
@@ -176,10 +106,11 @@ def told(record: dict[str, Any]) -> str:
     d = record["diagnosis"]
     error = {k: 1e3 * float(d["error"][k]) for k in ("before", "after")}
     rivals = ", ".join(f"{n}: {b['name'] or '-'}" for n, b in record["baselines"].items())
+    rivals = rivals and f"; {rivals}"
     return (
         f"{where} {misfit:<34} {d['verdict']}: {', '.join(d['effects']) or '-':<24} "
         f"[{d['candidates'][0]['name']}] held out {error['before']:.2f} -> {error['after']:.2f} mm, "
-        f"noise {1e3 * case['noise']:.0f}; {record['simulations']} simulations, {record['seconds']:.0f} s; {rivals}"
+        f"noise {1e3 * case['noise']:.0f}; {record['simulations']} simulations, {record['seconds']:.0f} s{rivals}"
     )
 
 

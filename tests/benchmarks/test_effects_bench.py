@@ -1,23 +1,26 @@
 """The benchmark of hidden effects: that its cases are fair, and are what they say."""
 
 import itertools
+import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from effects import Kept, chosen, finished
+from effects import chosen
+from effects_bench.baselines import Fitted
 from effects_bench.cases import BLOCK, FIRST_SEEDS, SETTING_DECK, Case, plan
 from effects_bench.generation import flaws, generate
 from effects_bench.outside import LAWS, UNKNOWN, effect_class
-from effects_bench.running import Plan
+from effects_bench.run import Run
 from effects_bench.settings import SETTINGS
 from effects_bench.strength import RANGES, solve
 
 from muslin.core.errors import RolloutFailed
 from muslin.core.registry import REGISTRY
 from muslin.core.scenarios import preset
+from muslin.inference.noise import Noise
 
 CASE = Case(
     seed=7,
@@ -175,20 +178,38 @@ def test_chosen_settings_and_kinds_keep_the_order_of_the_plan() -> None:
 # --- going on after a kill -----------------------------------------------------------------------------------------
 
 
+def run(folder: Path, *baselines: str, made_of: str = "sources", draws: int = 1) -> Run:
+    return Run(folder / "cells", folder / "draws", 1, baselines, draws, made_of, "baselines")
+
+
 def test_a_stopped_run_goes_on_where_it_was(tmp_path: Path) -> None:
-    path = tmp_path / "effects.cells.partial"
-    kept = Kept(path, ["sources", 1])
-    assert kept.get(CASE) is None
-    kept.add(CASE, {"failed": None, "seconds": 1.5})
-    with path.open("a", encoding="utf-8") as file:
+    one = run(tmp_path)
+    assert one.record(CASE) is None
+    one.kept.add({"failed": None, "seconds": 1.5}, "sources", CASE.as_dict())
+    with (tmp_path / "cells").open("a", encoding="utf-8") as file:
         file.write('{"key": "abc", "rec')  # killed in the middle of a line
-    assert Kept(path, ["sources", 1]).get(CASE) == {"failed": None, "seconds": 1.5}
-    assert Kept(path, ["sources", 1]).get(replace(CASE, seed=8)) is None
-    assert Kept(path, ["other sources", 1]).get(CASE) is None
+    assert run(tmp_path).record(CASE) == {"failed": None, "seconds": 1.5, "baselines": {}}
+    assert run(tmp_path).record(replace(CASE, seed=8)) is None
+    assert run(tmp_path, made_of="other sources").record(CASE) is None
 
 
 def test_what_is_finished_is_told_though_the_time_is_up(tmp_path: Path) -> None:
-    kept, cases = Kept(tmp_path / "cells", ["sources"]), [CASE, replace(CASE, seed=8), replace(CASE, seed=9)]
-    kept.add(cases[2], {"seconds": 1.5})
-    again = Kept(tmp_path / "cells", ["sources"])
-    assert list(finished(cases, again, Plan(1, (), 1), tmp_path, 2, deadline=0.0)) == [(2, {"seconds": 1.5})]
+    cases = [CASE, replace(CASE, seed=8), replace(CASE, seed=9)]
+    run(tmp_path).kept.add({"seconds": 1.5}, "sources", cases[2].as_dict())
+    told = list(run(tmp_path).finished(cases, 2, deadline=0.0))
+    assert told == [(2, {"seconds": 1.5, "baselines": {}})]
+
+
+@pytest.mark.slow
+def test_baselines_are_asked_of_what_is_diagnosed_already_and_only_once(tmp_path: Path) -> None:
+    case = replace(CASE, kind="none", offers=(), role="slow", markers=5)
+    diagnosed = run(tmp_path)
+    # what a diagnosis leaves for baselines
+    fitted = Fitted(np.array([0.5, 0.5]), Noise(0.002, 0.0, "told", "m", 0.1), 1e-3)
+    diagnosed.kept.add({"failed": None, "fitted": fitted.to_json()}, "sources", case.as_dict())
+    asked = list(run(tmp_path, "sindy").finished([case], 1, time.monotonic() + 600))
+    assert [set(record["baselines"]) for _, record in asked] == [set(), {"sindy"}]
+    assert "failed" not in asked[-1][1]["baselines"]["sindy"]
+    again = list(run(tmp_path, "sindy").finished([case], 1, time.monotonic() + 600))
+    assert again == [asked[-1]]
+    assert run(tmp_path, "sindy", draws=2).record(case) == asked[0][1]

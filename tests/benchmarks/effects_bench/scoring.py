@@ -75,6 +75,8 @@ def answer_of(record: dict[str, Any], method: str | None) -> Answer | None:
     found = record.get("baselines", {}).get(method)
     if found is None or method in PREDICTORS:
         return None
+    if found.get("failed"):
+        return Answer("failed", None, ())
     name = found["name"]
     return Answer("named" if name else "none", name, (name,) if name else ())
 

@@ -7,7 +7,7 @@ from .bic import bic
 from .correlation import correlation
 from .residual_network import residual_network
 from .sindy import sindy
-from .trial import Answer, Trial, make_trial
+from .trial import Answer, Fitted, Trial, make_trial
 
 BASELINES: dict[str, Callable[[Trial], Answer]] = {
     "correlation": correlation,
@@ -17,4 +17,4 @@ BASELINES: dict[str, Callable[[Trial], Answer]] = {
     "residual-network": residual_network,
 }
 
-__all__ = ["BASELINES", "Answer", "Trial", "make_trial"]
+__all__ = ["BASELINES", "Answer", "Fitted", "Trial", "make_trial"]

@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,16 +32,43 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False)
+class Fitted:
+    """What baselines take from the fit of a case.
+
+    Args:
+        unit: the best fit of the model without effects ``(D,)``, in the unit cube.
+        noise: of the measurement.
+        step: of derivatives in the unit cube.
+    """
+
+    unit: FloatArray
+    noise: Noise
+    step: float
+
+    @classmethod
+    def of(cls, study: Study) -> "Fitted":
+        """Of a study that is fitted."""
+        fit = load_fit(study)
+        return cls(read(study.step_results("fit"), "estimate_unit"), fit.noise, fit.derivative_step)
+
+    def to_json(self) -> dict[str, Any]:
+        return {"unit": self.unit.tolist(), "noise": asdict(self.noise), "step": self.step}
+
+    @classmethod
+    def from_json(cls, content: dict[str, Any]) -> "Fitted":
+        return cls(np.array(content["unit"]), Noise(**content["noise"]), content["step"])
+
+
+@dataclass(frozen=True, eq=False)
 class Trial:
     """One case as a baseline sees it. Nothing here knows the truth.
 
     Args:
         case: its flaws and setting, not to be asked for what it hides.
-        study: fitted.
+        study: of the case.
         problem: of the study, with every candidate effect in it.
         pool: of this problem.
-        noise, step: as the fit has found them: of the measurement, and of derivatives in the unit cube.
-        unit: the best fit of the model without effects ``(D,)``, in the unit cube.
+        fitted: the model without effects.
         candidates: names of the effects that can act.
         draws: that may be simulated beforehand for all cases of a setting.
         cache: folder for them.
@@ -50,18 +78,29 @@ class Trial:
     study: Study
     problem: Problem
     pool: SimulationPool
-    noise: Noise
-    step: float
-    unit: FloatArray
+    fitted: Fitted
     candidates: tuple[str, ...]
     draws: int
     cache: Path
+
+    @property
+    def noise(self) -> Noise:
+        return self.fitted.noise
+
+    @property
+    def unit(self) -> FloatArray:
+        return self.fitted.unit
 
     def objective(self, *effects: str) -> Objective:
         """Residuals of the model with these effects, on the fitted recordings."""
         space = self.problem.with_effects(*effects).space
         return Objective(
-            self.pool, space, self.problem.fit_on, self.noise, Offsets(), discrepancy=Discrepancy(step=self.step)
+            self.pool,
+            space,
+            self.problem.fit_on,
+            self.noise,
+            Offsets(),
+            discrepancy=Discrepancy(step=self.fitted.step),
         )
 
     def start(self, effect: str) -> FloatArray:
@@ -71,7 +110,7 @@ class Trial:
 
 
 @contextmanager
-def make_trial(case: Case, study: Study, draws: int, cache: Path) -> Iterator[Trial]:
+def make_trial(case: Case, study: Study, fitted: Fitted, draws: int, cache: Path) -> Iterator[Trial]:
     """A trial, and its pool while it lasts."""
     scenario = study.problem.scenarios[study.problem.fit_on[0]]
     names = tuple(
@@ -82,6 +121,5 @@ def make_trial(case: Case, study: Study, draws: int, cache: Path) -> Iterator[Tr
     )
     effects: dict[str, type[Effect]] = {n: REGISTRY.get("effect", n) for n in names}
     problem = replace(study.problem, effects=effects)
-    fit, unit = load_fit(study), read(study.step_results("fit"), "estimate_unit")
     with study.pool(problem) as pool:
-        yield Trial(case, study, problem, pool, fit.noise, fit.derivative_step, unit, names, draws, cache)
+        yield Trial(case, study, problem, pool, fitted, names, draws, cache)
