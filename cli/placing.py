@@ -11,6 +11,7 @@ from ..core.body import Body
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.registry import REGISTRY
+from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import Plan, plan_table
 
@@ -41,7 +42,7 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
 
     Points that are as many as vertices sit on the vertices; else a solid carries each where it is in
     the first frame, and on cloth and ropes each sits on the nearest vertex. A rope whose markers reach from one
-    gripper to the other starts through them.
+    gripper to the other starts through them, or through where they stand beside it.
 
     Args:
         plan: of the study.
@@ -54,9 +55,7 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
         return plan, []
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
     if plan.markers is None and not sized and starts_measured(plan, used):
-        return replace(plan, start="measured"), [
-            "every take starts through its markers, from one gripper to the other; its length follows from them"
-        ]
+        return _measured(plan, measured, study)
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
     if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
@@ -68,6 +67,20 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
             f"the {count} points are tied to the object where they are in the first frame"
         ]
     return _on_nearest(plan, measured, study, count)
+
+
+def _measured(plan: Plan, measured: Measurement, study: Path) -> tuple[Plan, list[str]]:
+    """Through the markers of the first frame, which stand beside the rope if their distances say so."""
+    plan = replace(plan, start="measured")
+    remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
+    problem = build_problem(parse_config(plan_table(plan), str(study)), measured, study.parent)
+    away = standing_off([problem.recordings[name] for name in plan.fit_on])
+    if not away:
+        return plan, remarks
+    return replace(plan, markers="beside"), [
+        *remarks,
+        f"the markers stand {1e3 * away:.2g} mm beside the axis of the rope, by how their distances change as it bends",
+    ]
 
 
 def starts_measured(plan: Plan, used: Sequence[Recording]) -> bool:

@@ -146,6 +146,8 @@ def _object(plan: Plan) -> list[str]:
             "# Every take starts through the markers of its first frame, as fast as they were, and is as long as the",
             "# curve through them. Instead: size, markers and settle, for a rope that hangs at rest at the start.",
             f"start = {_value(plan.start)}",
+            "# Where the markers stand: on the axis of the rope, or beside it, told by how their distances change.",
+            f'{"" if plan.markers else "# "}markers = "beside"',
         ]
     if plan.mesh is None:
         return [

@@ -18,6 +18,21 @@ _USUAL, _WEIGHT = 0.01, 25.0
 _ROUNDS = 8
 #: Distances that are further off than this many robust standard deviations hardly count.
 _FAR = 3.0
+#: Markers that stand further beside the axis than this are worth a word, root mean square [m].
+_MATTERS = 0.005
+
+
+def standing_off(recordings: Sequence[Recording]) -> float:
+    """How far the markers of a rope stand beside its axis, root mean square [m].
+
+    Zero where that is too little to matter, and where the recordings do not tell.
+    """
+    try:
+        offsets = told_standoffs(recordings).offsets
+    except InputError:
+        return 0.0
+    away = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
+    return away if away > _MATTERS else 0.0
 
 
 def told_standoffs(recordings: Sequence[Recording]) -> Beside:

@@ -3,14 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
-from ...core.errors import InputError
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
-from ...core.scenarios.standoffs import told_standoffs
+from ...core.scenarios.standoffs import standing_off
 from ...core.study import Problem, SimulationPool, Task
 from ..noise import Noise
 from ..residuals import rms_apart
@@ -18,8 +15,6 @@ from ..roughness import Roughness, roughness, unrepeatable
 
 #: A step that moves the model by more than this is told of [noise standard deviations].
 STEP_MATTERS = 1.0
-#: Markers that stand further beside the axis of a rope than this are told of, root mean square [m].
-BESIDE_MATTERS = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -98,12 +93,8 @@ def markers_beside(problem: Problem) -> list[str]:
     scenarios = [problem.scenarios[name] for name in problem.fit_on]
     if any(s.start_motion is None or s.beside is not None for s in scenarios):
         return []
-    try:
-        offsets = told_standoffs([problem.recordings[name] for name in problem.fit_on]).offsets
-    except InputError:
-        return []  # these recordings do not tell
-    away = float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
-    if away <= BESIDE_MATTERS:
+    away = standing_off([problem.recordings[name] for name in problem.fit_on])
+    if not away:
         return []
     return [
         f"the distances between markers change as the rope bends as if these stood {1e3 * away:.2g} mm beside its "

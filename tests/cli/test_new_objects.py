@@ -1,5 +1,6 @@
 """``muslin new`` for ropes and for objects of one's own."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,30 @@ def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
     assert np.abs(first - problem.recordings["one"].series.points[0]).max() < 0.002
     assert status("new", path, "--measurement", measurement, "--scenario", "cable", "--size", "0.8", "--force") == 0
     assert read_config(path).scenario.start is None
+
+
+def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A rope of one length that bends more and more, with markers above it."""
+    away, length = 0.012 * np.sin(np.linspace(0, np.pi, 9)), 0.6
+    s, bends = np.linspace(0.0, length, 9), np.linspace(0.5, 4.0, 40)
+    angle = bends[:, None] * (s - length / 2)  # of the tangent of a circle
+    up = np.stack([-np.sin(angle), 0 * angle, np.cos(angle)], axis=2)
+    axis = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], axis=2) / bends[:, None, None]
+    points = axis + away[:, None] * up
+    poses = np.zeros((len(bends), 2, 7))
+    poses[..., :3], poses[..., 3] = points[:, [0, -1]], 1.0
+    times = 0.1 * np.arange(len(bends))
+    take = Recording("one", PointSeries(times, points), Motion(times, poses))
+    save_measurement(Measurement((take, replace(take, name="two"))), tmp_path / "m.zarr")
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
+    said = capsys.readouterr().out
+    assert "mm beside the axis of the rope" in said
+    away_said = float(said.split("the markers stand ")[1].split(" mm")[0])
+    assert away_said == pytest.approx(1e3 * np.sqrt(np.mean(away**2)), rel=0.25)
+    config = read_config(path)
+    assert config.scenario.markers == "beside" and config.scenario.start == "measured"
+    build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path)
 
 
 @pytest.mark.parametrize("fault", ["hidden", "out of order", "far from the grippers", "few"])
