@@ -13,6 +13,8 @@ from ..polish import Objective, Polished
 #: A coefficient that a motion shows is known to this share of its prior range, or better: a typical
 #: effect is a quarter of the range, and a third of that is three standard deviations away from zero.
 VISIBLE = 1.0 / 12.0
+#: Held-out motions show an effect if -2 log likelihood would fall by this much, three standard deviations.
+SHOWN = 9.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,8 @@ class Candidate:
         held_out: root mean square error on each held-out recording [unit].
         held_out_white: mean square of all of them, whitened by noise and numerics [noise variances].
         numerics: what errors of the numbers themselves explain in the fit's residuals [noise variances].
+        held_out_shift: how far it is on held-out recordings from the model without it, as a sum of squares [noise
+            variances].
         promised: residual sum of squares that a linear model promised at the first look.
         approached: the curvature is of a search from near here rather than of the first look.
         refitted: polished to the end, so what it leaves is what it cannot explain.
@@ -39,6 +43,7 @@ class Candidate:
     held_out: dict[str, float] = field(default_factory=dict)
     held_out_white: float = float("nan")
     numerics: float = 0.0
+    held_out_shift: float = float("inf")
     promised: float = float("inf")
     approached: bool = False
     refitted: bool = False
@@ -84,6 +89,11 @@ class Candidate:
         """
         sd = np.sqrt(np.diag(self.fit.covariance))[self.base :]
         return bool(sd.min() < VISIBLE)
+
+    @property
+    def shown_held_out(self) -> bool:
+        """Would the held-out motions get better by this effect, as strong as it was found, beyond what chance gives?"""
+        return self.held_out_shift >= SHOWN
 
     @property
     def surviving(self) -> float:

@@ -129,6 +129,7 @@ def _result(
                 "objection": objection(e, c),
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
+                "held_out_shows": c.shown_held_out if held else None,
                 "identifiability": c.surviving if c.visible else 0.0,
                 "refitted": c.refitted,
             }

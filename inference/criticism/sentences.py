@@ -30,6 +30,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
         "where": _where(result),
         "numerics": numerics(result),
         "unrepeatable": unrepeatable(result),
+        "unchecked": _unchecked(result),
         "alternatives": _alternatives(result),
         "invisible": invisible(result),
         "to_be_sure": _to_be_sure(study, result),
@@ -109,6 +110,17 @@ def _where(result: dict[str, Any]) -> str:
     return (
         f"Where: {100 * where['share']:.0f} % of the error that goes is in {where['recording']}, most of it from "
         f"{where['from']:.2f} to {where['to']:.2f} s{point}."
+    )
+
+
+def _unchecked(result: dict[str, Any]) -> str:
+    """That no held-out motion speaks for what was found, where none would show it."""
+    named = result["effects"]
+    if not named or any(c["held_out_shows"] is not False for c in result["candidates"] if c["name"] in named):
+        return ""
+    return (
+        f"Not checked: held-out motions are too gentle to show {' and '.join(named)} as strong as it is here, so what "
+        "was not fitted says nothing for or against it; hold out a motion like those that were fitted."
     )
 
 

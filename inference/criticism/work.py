@@ -15,7 +15,7 @@ from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
 from .candidate import Candidate, root_mean_square
-from .held_out import held_out_residuals
+from .held_out import HeldOut, held_out_residuals
 from .numerics import numerics
 from .verdict import Evidence
 
@@ -117,15 +117,15 @@ class Work:
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
         """Hold out, and put together what decides between candidates for the model that has ``effects``."""
         space = self.space(effects)
-        held, white = self.held_out(space, plain.unit)
+        held = self.held_out(space, plain.unit)
         return Evidence(
             rss_plain=plain.rss,
             count=max(plain.count - len(space), 1.0),
-            held_out_plain=root_mean_square(list(held.values())),
-            held_out_white=white,
+            held_out_plain=root_mean_square(list(held.errors.values())),
+            held_out_white=held.mean_square,
             noise_sd=self.fit.noise.sd,
             noise_error=self.fit.noise.relative_error,
-            candidates=tuple(self.judged(c) for c in candidates),
+            candidates=tuple(self.judged(c, held) for c in candidates),
             unsure=self.fit.noise.information * self.discrepancy.left_to_chance(self.problem.fit_on),
         )
 
@@ -147,18 +147,27 @@ class Work:
         white = objective.one(fit.unit)
         return replace(fit, white=white, count=objective.count(white))
 
-    def judged(self, candidate: Candidate) -> Candidate:
-        """With its held-out errors, and what the numerics explain in its residuals [noise variances]."""
-        held, white = self.held_out(candidate.space, candidate.fit.unit)
+    def judged(self, candidate: Candidate, plain: HeldOut | None = None) -> Candidate:
+        """With its held-out errors, and what the numerics explain in its residuals [noise variances].
+
+        Args:
+            candidate: fitted.
+            plain: the model without it on the held-out recordings, where it is to be compared with that.
+        """
+        held = self.held_out(candidate.space, candidate.fit.unit)
         parts = self.objective(()).parts(candidate.fit.white)
         numerics = sum(self.discrepancy.explained(recording, part) for recording, part in parts.items())
-        return replace(candidate, held_out=held, held_out_white=white, numerics=numerics)
+        shift = float("inf") if plain is None else held.shift(plain)
+        return replace(
+            candidate,
+            held_out=held.errors,
+            held_out_white=held.mean_square,
+            held_out_shift=shift,
+            numerics=numerics,
+        )
 
-    def held_out(self, space: ParameterSpace, unit: FloatArray) -> tuple[dict[str, float], float]:
-        """Root mean square error on every held-out recording [unit], and mean square of all, whitened.
-
-        Each point is simulated once.
-        """
+    def held_out(self, space: ParameterSpace, unit: FloatArray) -> HeldOut:
+        """A point of a space on the held-out recordings. Each point is simulated once."""
         values = space.as_dict(space.from_unit(unit))
         # a coefficient of zero is as good as one that is not there
         key = tuple(sorted((name, value) for name, value in values.items() if value or "." not in name))
@@ -166,11 +175,6 @@ class Work:
             self._held_out[key] = held_out_residuals(self.pool, self.problem, space, unit, self.fit.noise, self.offsets)
         found = self._held_out[key]
         errors = {name: float("inf") if r is None else r.rms for name, r in found.items()}
-        if not found:
-            return {}, float("nan")
-        if any(r is None for r in found.values()):
-            return errors, float("inf")
         white = [self.discrepancy.whitened(name, r.white) for name, r in found.items() if r is not None]
-        all_of_them = np.concatenate(white)
-        count = self.fit.noise.information * (len(all_of_them) - self.discrepancy.dropped(list(found)))
-        return errors, float(all_of_them @ all_of_them) / max(count, 1.0)
+        every = np.concatenate(white) if white and len(white) == len(found) else None
+        return HeldOut(errors, every, self.fit.noise.information, self.discrepancy.dropped(list(found)))

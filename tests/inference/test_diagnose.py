@@ -21,7 +21,7 @@ SCHEMA = {
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
-    "identifiability", "refitted",
+    "held_out_shows", "identifiability", "refitted",
 }  # fmt: skip
 ERROR = {"noise", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
 

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _in_part
+from muslin.inference.criticism.sentences import _in_part, _unchecked
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -42,6 +42,14 @@ def test_a_candidate_that_is_a_part_of_the_answer_is_told_with_what_it_is_good_f
     assert "8.3 mm → 6.5 mm" in _in_part(part, "m")
     for less in ({"explained": 0.1}, {"held_out_after": 0.0084}, {"held_out_before": None, "held_out_after": None}):
         assert not _in_part(part | less, "m")
+
+
+def test_held_out_motions_that_show_nothing_are_told() -> None:
+    rows = [{"name": "wind", "held_out_shows": False}, {"name": "drag", "held_out_shows": True}]
+    assert "too gentle to show wind" in _unchecked({"effects": ["wind"], "candidates": rows})
+    assert not _unchecked({"effects": ["wind", "drag"], "candidates": rows})
+    assert not _unchecked({"effects": [], "candidates": rows})
+    assert not _unchecked({"effects": ["wind"], "candidates": [{"name": "wind", "held_out_shows": None}]})
 
 
 def test_numbers_that_move_the_model_are_told_where_a_misfit_stays() -> None:

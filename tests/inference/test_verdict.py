@@ -7,6 +7,7 @@ import pytest
 
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
+from muslin.inference.criticism.held_out import HeldOut
 from muslin.inference.criticism.verdict import Decision, Evidence, decide, objection
 from muslin.inference.polish import Polished
 
@@ -74,6 +75,26 @@ def test_nothing_is_ruled_out_that_was_not_refitted() -> None:
 
 def test_not_named_when_the_held_out_motion_gets_worse() -> None:
     assert decide(evidence(9 * COUNT, candidate("drag", 1.5 * COUNT, held_out=0.011))).verdict == "none"
+
+
+def test_held_out_motions_that_would_not_show_an_effect_do_not_speak_against_it() -> None:
+    """A gentle motion has its own noise, which no effect takes away."""
+    shown = candidate("drag", 1.02 * COUNT, held_out=0.0031)
+    e = evidence(9 * COUNT, shown, held_out=0.0031)
+    assert decide(e).verdict == "none" and objection(e, shown) == "held-out"
+    unseen = replace(shown, held_out_shift=2.0)
+    assert decide(evidence(9 * COUNT, unseen, held_out=0.0031)) == Decision("named", ("drag",))
+
+
+def test_what_two_models_differ_by_on_held_out_motions() -> None:
+    rng = np.random.default_rng(0)
+    a = rng.normal(size=400)
+    one, two = (HeldOut({"other": 0.003}, w, information=0.5, dropped=0) for w in (a, a + 0.1))
+    assert one.shift(two) == pytest.approx(0.5 * 400 * 0.01)
+    assert one.mean_square == pytest.approx(float(a @ a) / 200)
+    assert HeldOut({"other": np.inf}, None, 1.0, 0).shift(one) == np.inf
+    assert HeldOut({"other": np.inf}, None, 1.0, 0).mean_square == np.inf
+    assert np.isnan(HeldOut({}, None, 1.0, 0).mean_square)
 
 
 def test_not_named_when_the_coefficient_may_be_zero() -> None:
