@@ -56,11 +56,12 @@ def test_the_table_of_posteriors_is_what_the_benchmark_wrote() -> None:
             assert cell == wanted
 
 
-def test_the_table_of_real_recordings_is_what_the_benchmark_wrote() -> None:
+@pytest.mark.parametrize("first", ["| on the test seeds | value", "| held-out error [mm] | carried along"])
+def test_a_table_that_the_benchmarks_print_is_in_the_readme(first: str) -> None:
     done = subprocess.run(
         [sys.executable, ROOT / "tests/benchmarks/readme_table.py"], capture_output=True, text=True, check=True
     )
-    table = done.stdout[done.stdout.index("| held-out error [mm] | carried along") :].rstrip()
+    table = next(part for part in done.stdout.split("\n\n") if part.startswith(first)).rstrip()
     assert table.count("\n") > 8 and table in README
 
 
