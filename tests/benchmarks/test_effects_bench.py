@@ -207,9 +207,9 @@ def test_baselines_are_asked_of_what_is_diagnosed_already_and_only_once(tmp_path
     # what a diagnosis leaves for baselines
     fitted = Fitted(np.array([0.5, 0.5]), Noise(0.002, 0.0, "told", "m", 0.1), 1e-3)
     diagnosed.kept.add({"failed": None, "fitted": fitted.to_json()}, "sources", case.as_dict())
-    asked = list(run(tmp_path, "sindy").finished([case], 1, time.monotonic() + 600))
-    assert [set(record["baselines"]) for _, record in asked] == [set(), {"sindy"}]
-    assert "failed" not in asked[-1][1]["baselines"]["sindy"]
-    again = list(run(tmp_path, "sindy").finished([case], 1, time.monotonic() + 600))
+    asked = list(run(tmp_path, "residual-network").finished([case], 1, time.monotonic() + 600))
+    assert [set(record["baselines"]) for _, record in asked] == [set(), {"residual-network"}]
+    assert "failed" not in asked[-1][1]["baselines"]["residual-network"]
+    again = list(run(tmp_path, "residual-network").finished([case], 1, time.monotonic() + 600))
     assert again == [asked[-1]]
-    assert run(tmp_path, "sindy", draws=2).record(case) == asked[0][1]
+    assert run(tmp_path, "residual-network", draws=2).record(case) == asked[0][1]
