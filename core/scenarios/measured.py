@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..beside import Beside
+from ..beside import Beside, curves
 from ..body import rope_line
 from ..differences import fourth_differences, robust_sd
 from ..errors import InputError
@@ -130,18 +130,6 @@ def _curve(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if not (chords > 0).all():
         raise InputError(f"markers {int(np.argmin(chords))} and the next are at one place in the first frame")
-    count = len(points)
-    matrix, right = np.eye(count), np.zeros((count, 3))
-    for k in range(1, count - 1):  # second derivatives: the slopes on both sides of every inner point agree
-        a, b = chords[k - 1], chords[k]
-        matrix[k, k - 1 : k + 2] = a, 2 * (a + b), b
-        right[k] = 6 * ((points[k + 1] - points[k]) / b - (points[k] - points[k - 1]) / a)
-    bends = np.linalg.solve(matrix, right)
-    u = np.linspace(0.0, 1.0, _FINE, endpoint=False)[:, None]
-    parts = []
-    for k, h in enumerate(chords):
-        straight = (1 - u) * points[k] + u * points[k + 1]
-        parts.append(straight + h**2 / 6 * (((1 - u) ** 3 - (1 - u)) * bends[k] + (u**3 - u) * bends[k + 1]))
-    curve = np.concatenate([*parts, points[-1:]])
+    (curve,), places = curves(points[None], _FINE)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-    return curve, along, along[::_FINE]
+    return curve, along, along[places]
