@@ -1,4 +1,4 @@
-"""Readers of published sets: what they promise, on small files made here, and on the real ones where there are any."""
+"""Readers of published sets: what they promise, on small files made here."""
 
 import warnings
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from published import ROOT, published
+from published import ROOT
 
 from muslin.core.dataset import DatasetNote, cropped
 from muslin.core.errors import InputError, MissingFileError
@@ -17,7 +17,6 @@ from muslin.core.registry import REGISTRY
 from muslin.core.testing import check_dataset
 
 DROPS = ROOT / "examples/balls/drops.csv"
-FOLDERS = {"deform-cable": "cable", "carried-cloth": "cloth_carried", "cloth-cloud": "cloth_cloud"}
 
 
 def read(name: str, path: Path, *takes: str) -> tuple[list[Recording], list[str]]:
@@ -26,10 +25,6 @@ def read(name: str, path: Path, *takes: str) -> tuple[list[Recording], list[str]
         warnings.simplefilter("always", DatasetNote)
         recordings = REGISTRY.get("dataset", name)(path, list(takes))
     return recordings, [str(w.message) for w in caught]
-
-
-def real(name: str) -> Path:
-    return published(FOLDERS[name])
 
 
 def swinging_cable(frames: int = 60, markers: int = 8) -> np.ndarray[Any, Any]:
@@ -272,38 +267,3 @@ def test_a_crop_keeps_the_clock() -> None:
     assert cropped(drop, None, None) is drop
     with pytest.raises(InputError, match="fewer than 2 frames"):
         cropped(drop, 100.0, None)
-
-
-def test_real_cables_have_a_length_that_hardly_changes() -> None:
-    path = real("deform-cable") / "cable1.npz"
-    takes, notes = read("deform-cable", path)
-    assert len(takes) == 56 and any("lost frames" in n for n in notes)
-    for take in takes:
-        apart = np.linalg.norm(np.diff(take.series.points, axis=1), axis=2)
-        assert np.isfinite(apart).mean() > 0.95
-        assert 0.9 < np.nansum(np.nanmedian(apart, axis=0)) < 1.15  # metres
-        assert take.gripper is not None and take.gripper.grippers == 2
-    hangs = np.mean([t.series.points[:, 6, 2].mean() < t.gripper.poses[:, :, 2].mean() for t in takes if t.gripper])
-    assert hangs == 1.0  # z is up
-
-
-def test_real_carried_cloths_lag_as_published() -> None:
-    takes, notes = read("carried-cloth", real("carried-cloth"))
-    assert len(takes) == len(list(real("carried-cloth").glob("*.npz")))
-    lags = [float(n.split(" by ")[1].split(" s;")[0]) for n in notes if " by " in n]
-    assert min(lags) >= 0.24 and max(lags) <= 0.38
-    for take in takes:
-        n = int(np.sqrt(take.series.points.shape[1]))
-        top, low = take.series.points[:, :n], take.series.points[:, -n:]
-        assert 0.15 < np.nanmedian(top[..., 2]) - np.nanmedian(low[..., 2]) < 0.35
-        assert take.gripper is not None
-        pose = take.gripper.at(take.series.time)[:, 0, :3]
-        assert np.nanmedian(np.linalg.norm(np.nanmean(top, axis=1) - pose, axis=1)) < 0.03
-
-
-def test_real_clouds_are_in_metres_above_the_table() -> None:
-    takes, _ = read("cloth-cloud", real("cloth-cloud"))
-    assert len(takes) == 12 and len({t.motion for t in takes}) == 6
-    for take in takes:
-        assert not take.series.correspondence
-        assert 0.04 < np.nanmin(take.series.points[..., 2]) < np.nanmax(take.series.points[..., 2]) < 0.45

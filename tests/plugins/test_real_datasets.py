@@ -1,0 +1,40 @@
+"""Readers of published sets on the real recordings, where there are any."""
+
+import numpy as np
+from published import published
+from test_datasets import read
+
+
+def test_real_cables_have_a_length_that_hardly_changes() -> None:
+    path = published("cable") / "cable1.npz"
+    takes, notes = read("deform-cable", path)
+    assert len(takes) == 56 and any("lost frames" in n for n in notes)
+    for take in takes:
+        apart = np.linalg.norm(np.diff(take.series.points, axis=1), axis=2)
+        assert np.isfinite(apart).mean() > 0.95
+        assert 0.9 < np.nansum(np.nanmedian(apart, axis=0)) < 1.15  # metres
+        assert take.gripper is not None and take.gripper.grippers == 2
+    hangs = np.mean([t.series.points[:, 6, 2].mean() < t.gripper.poses[:, :, 2].mean() for t in takes if t.gripper])
+    assert hangs == 1.0  # z is up
+
+
+def test_real_carried_cloths_lag_as_published() -> None:
+    takes, notes = read("carried-cloth", published("cloth_carried"))
+    assert len(takes) == len(list(published("cloth_carried").glob("*.npz")))
+    lags = [float(n.split(" by ")[1].split(" s;")[0]) for n in notes if " by " in n]
+    assert min(lags) >= 0.24 and max(lags) <= 0.38
+    for take in takes:
+        n = int(np.sqrt(take.series.points.shape[1]))
+        top, low = take.series.points[:, :n], take.series.points[:, -n:]
+        assert 0.15 < np.nanmedian(top[..., 2]) - np.nanmedian(low[..., 2]) < 0.35
+        assert take.gripper is not None
+        pose = take.gripper.at(take.series.time)[:, 0, :3]
+        assert np.nanmedian(np.linalg.norm(np.nanmean(top, axis=1) - pose, axis=1)) < 0.03
+
+
+def test_real_clouds_are_in_metres_above_the_table() -> None:
+    takes, _ = read("cloth-cloud", published("cloth_cloud"))
+    assert len(takes) == 12 and len({t.motion for t in takes}) == 6
+    for take in takes:
+        assert not take.series.correspondence
+        assert 0.04 < np.nanmin(take.series.points[..., 2]) < np.nanmax(take.series.points[..., 2]) < 0.45
