@@ -3,6 +3,7 @@
 import json
 from typing import Any
 
+from effects_bench.table import shown
 from table import RESULTS
 
 SIMULATORS = ("mujoco", "pybullet")
@@ -32,8 +33,8 @@ def wider() -> list[str]:
         if not f["bar"] or not f["count"]:
             continue
         is_share = f["low"] is not None
-        value = f"{100 * f['value']:.0f} %" if is_share else f"{f['value']:.3g}"
-        interval = f"{100 * f['low']:.0f} to {100 * f['high']:.0f} %" if is_share else ""
+        value = shown(f["value"], is_share)
+        interval = f"{100 * f['low']:.1f} to {100 * f['high']:.1f} %" if is_share else ""
         met = "met" if f["met"] else "**missed**"
         lines.append(f"| {f['name']} | {value} | {f['count']} | {interval} | {f['bar']}, {met} |")
     return lines

@@ -137,16 +137,19 @@ def markdown(found: Sequence[Figure], rivals: Sequence[str]) -> str:
         is_share = f.low is not None
         interval = f"{100 * f.low:.1f} to {100 * f.high:.1f} %" if is_share and f.count else ""  # type: ignore[operator]
         met = "" if f.met is None else "met" if f.met else "**missed**"
-        theirs = [_told((f.rivals or {}).get(r), is_share) for r in rivals]
-        cells = [f.name, _told(f.value, is_share), str(f.count), interval, f.bar, met, *theirs]
+        theirs = [shown((f.rivals or {}).get(r), is_share) for r in rivals]
+        cells = [f.name, shown(f.value, is_share), str(f.count), interval, f.bar, met, *theirs]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
-def _told(value: float | None, is_share: bool) -> str:
+def shown(value: float | None, is_share: bool) -> str:
+    """A figure as the tables have it."""
     if value is None:
         return "–"
-    return f"{100 * value:.1f} %" if is_share else f"{value:.3g}"
+    if is_share:
+        return f"{100 * value:.1f} %"
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def as_json(found: Sequence[Figure]) -> list[dict[str, Any]]:
