@@ -37,6 +37,24 @@ def turned(quaternion: FloatArray, poses: FloatArray) -> FloatArray:
     return np.concatenate(made, axis=-1)
 
 
+def turns_about(axes: FloatArray, quaternions: FloatArray) -> FloatArray:
+    """By how much what turns about moving axes has turned about them ``(T,)`` [rad] since the first time.
+
+    Seen from a frame that is carried along with the axis from time to time by the shortest turn (Bishop 1975).
+
+    Args:
+        axes: unit vectors ``(T, 3)``, fixed in what turns.
+        quaternions: of what turns, w x y z ``(T, 4)``.
+    """
+    first = np.cross(axes[0], np.eye(3)[np.argmin(np.abs(axes[0]))])
+    fixed = rotate(multiply(quaternions, inverse(quaternions[0])), first / np.linalg.norm(first))
+    before, after, u = axes[:-1], axes[1:], fixed[:-1]
+    bend = np.sum(u * after, axis=1, keepdims=True) / np.maximum(1.0 + np.sum(before * after, axis=1), 1e-9)[:, None]
+    carried = u - bend * (before + after)
+    steps = np.arctan2(np.sum(np.cross(after, carried) * fixed[1:], axis=1), np.sum(carried * fixed[1:], axis=1))
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Poses of G grippers at K times, held before the first and after the last.

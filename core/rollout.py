@@ -8,6 +8,7 @@ from functools import reduce
 import numpy as np
 
 from .arrays import FloatArray
+from .clamps import clamp_turns
 from .effect import Effect
 from .errors import InputError, RolloutFailed
 from .interpolation import interpolate
@@ -23,6 +24,8 @@ SETTLE_RATE = 8.0
 #: Step at which an effect may resample a command [s].
 COMMAND_STEP = 0.002
 _CHECK_EVERY = 10
+#: Turns of a gripper about a rope that are not worth telling an engine [rad]: a millionth of a whole one.
+_NO_TURN = 6e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +102,10 @@ def rollout(
         steps = int(np.ceil((end - start) / dt - 1e-9))
         clock = start + dt * np.arange(-settle_steps, steps + 1)
         held = scenario.held_positions(np.maximum(clock, start), scene.start_positions)
+        rolls: FloatArray | None = None
+        if "twist" in simulator.capabilities:
+            rolls = clamp_turns(scene.body, scene.grasps, scenario.motion.at(np.maximum(clock, start))[..., 3:], held)
+            rolls = rolls if np.abs(rolls).max(initial=0.0) > _NO_TURN else None
         sane = SanityCheck(scene)
         brake = -SETTLE_RATE * world.masses[:, None]
         path = np.empty((steps + 1, len(scene.body.vertices), 3))
@@ -127,10 +134,10 @@ def rollout(
             target = held[k + 1]
             for shift in shifts:
                 target = shift(now, state, target)
-            if stiffness is None:
-                world.step(target, total)
-            else:
-                world.step(target, total, stiffness)
+            more: dict[str, FloatArray] = {} if stiffness is None else {"stiffness": stiffness}
+            if rolls is not None:
+                more["turns"] = rolls[k + 1]
+            world.step(target, total, **more)
     finally:
         world.close()
     vertices = interpolate(np.maximum(seen, start), clock[settle_steps:], path)

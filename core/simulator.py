@@ -66,7 +66,13 @@ class World(ABC):
         """Where the vertices are, at the end of the last step or at the start."""
 
     @abstractmethod
-    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
+    def step(
+        self,
+        held: FloatArray,
+        forces: FloatArray | None,
+        stiffness: FloatArray | None = None,
+        turns: FloatArray | None = None,
+    ) -> None:
         """Advance by :attr:`time_step`.
 
         Args:
@@ -75,6 +81,9 @@ class World(ABC):
                 contact, or None for none. Those on held vertices have no effect.
             stiffness: factor ``(E,)`` on the stretch stiffness of every element in this step, or None for one.
                 Only given to simulators that can do ``"varying-stiffness"``.
+            turns: by how much each segment of a rope with both ends held has turned about itself at the end of the step
+                since the start ``(C,)`` [rad], against a frame that is carried along with it without twist, or None for
+                not at all. Only given to simulators that can do ``"twist"``.
 
         Raises:
             RolloutFailed: the engine reports that it could not do the step.

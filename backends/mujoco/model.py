@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
+from ...core.clamps import clamped_segments
 from ...core.material import ClothMaterial, RopeMaterial, SolidMaterial
 from ...core.obstacles import StaticMesh
 from ...core.plate import bending_matrix, is_flat, rest_folds, rest_stress
@@ -99,7 +100,7 @@ def compiled(scene: Scene, time_step: float) -> Model:
     model.dof_armature[held] = HELD_INERTIA * masses.max()
     clamped = np.zeros(0, np.int64)
     if isinstance(scene.material, RopeMaterial) and model.nv > 3 * count:
-        clamped = 3 * count + np.flatnonzero(rod.clamped_segments(body, scene.held))
+        clamped = 3 * count + np.flatnonzero(clamped_segments(body, scene.held))
         model.dof_armature[clamped] = HELD_INERTIA * scene.material.density * scene.material.diameter**2
     stretch, cells = _write_material(model, scene, bending)
     turn = frame(body) if quadratic_cells(body) else np.eye(3)

@@ -9,8 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
+from ...core.clamps import clamped_segments
 from ...core.material import RopeMaterial
 
 #: Stiffnesses of exactly zero make MuJoCo's compiler leave parts out.
@@ -41,11 +42,6 @@ def hinge_stiffnesses(body: Body, material: RopeMaterial, held: IntArray) -> tup
     flexible = np.where(flexible > 0, flexible, body.measures[:-1] + body.measures[1:])
     bend, twist = max(material.bending_rigidity, _SMALLEST), max(material.twist_rigidity, _SMALLEST)
     return bend / flexible, twist / flexible
-
-
-def clamped_segments(body: Body, held: IntArray) -> BoolArray:
-    """Segments ``(E,)`` of which both ends are held: they do not turn about themselves either."""
-    return np.asarray(np.isin(body.elements, held).all(axis=1))
 
 
 def aside(body: Body) -> FloatArray:

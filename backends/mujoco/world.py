@@ -57,6 +57,8 @@ class MujocoWorld(World):
         self._rest_held = self._rest[self._commanded[: 3 * len(scene.held)]]
         self._target = self._qpos[self._commanded]  # a copy
         self._target_held = self._target[: len(self._rest_held)]
+        self._target_turns = self._target[len(self._rest_held) :]
+        self._start_turns = self._target_turns.copy()
         self._positions = np.empty((count // 3, 3))
         self._flat = self._positions.reshape(-1)
         self._velocities = self._qvel[:count].reshape(-1, 3)
@@ -91,7 +93,13 @@ class MujocoWorld(World):
         """World vectors ``(N, 3)`` along the axes of the displacements."""
         return vectors if self._turn is None else np.asarray(vectors @ self._turn)
 
-    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
+    def step(
+        self,
+        held: FloatArray,
+        forces: FloatArray | None,
+        stiffness: FloatArray | None = None,
+        turns: FloatArray | None = None,
+    ) -> None:
         self._elapsed += self.time_step
         if forces is not None:
             if not np.isfinite(forces.sum()):  # MuJoCo would leave out the steps and say nothing
@@ -103,6 +111,8 @@ class MujocoWorld(World):
         np.subtract(held.ravel(), self._rest_held, out=self._target_held)
         if self._turn is not None:
             self._target_held[:] = (self._target_held.reshape(-1, 3) @ self._turn).ravel()
+        if turns is not None:
+            np.add(self._start_turns, turns, out=self._target_turns)
         velocity = (self._target - qpos[commanded]) / self.time_step
         qvel[commanded] = velocity
         if self._touching or not self._glide(forces):

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
+from ...core.clamps import clamped_segments
 from ...core.material import RopeMaterial
 from .compiled import compiled
 from .elasticity import Elasticity, Kernels, kernels
@@ -67,7 +68,7 @@ class Rod(Elasticity):
         self.kernels = _kernels()
         rest = np.array(body.measures, np.float64)
         unit = np.diff(body.vertices, axis=0) / rest[:, None]
-        clamped: BoolArray = np.all(np.isin(body.elements, held), axis=1)
+        clamped = clamped_segments(body, held)
         mean = 0.5 * (rest[:-1] + rest[1:])
         bending = material.bending_rigidity / mean * np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
         turn = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(unit, axis=0), axis=1), 0.0, 1.0))

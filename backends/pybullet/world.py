@@ -81,7 +81,13 @@ class SoftWorld(World):
     def state(self) -> State:
         return State(self._positions, self._velocities, self._contact.copy if self._touching else None)
 
-    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
+    def step(
+        self,
+        held: FloatArray,
+        forces: FloatArray | None,
+        stiffness: FloatArray | None = None,
+        turns: FloatArray | None = None,
+    ) -> None:
         substeps = self._substeps if stiffness is None else self._substeps_with(stiffness)
         dt = self.time_step / substeps
         self._elasticity.scale_stretch(stiffness)

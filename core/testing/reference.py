@@ -70,7 +70,13 @@ class ReferenceWorld(World):
     def state(self) -> State:
         return State(self._x, self._v, lambda: self._contacts)
 
-    def step(self, held: FloatArray, forces: FloatArray | None, stiffness: FloatArray | None = None) -> None:
+    def step(
+        self,
+        held: FloatArray,
+        forces: FloatArray | None,
+        stiffness: FloatArray | None = None,
+        turns: FloatArray | None = None,
+    ) -> None:
         h, free, fixed = self.time_step, self._free_dofs, self._held_dofs
         pull, matrix = self._elastic(stiffness)
         force = pull + (self.masses[:, None] * self._gravity + (0.0 if forces is None else forces)).ravel()
