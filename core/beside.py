@@ -78,6 +78,11 @@ def rope_frames(curve: FloatArray, poses: FloatArray, turn: float) -> FloatArray
     return np.stack(turned, axis=2)
 
 
+def untwisted_frames(curve: FloatArray, poses: FloatArray) -> FloatArray:
+    """The same axes of a rope ``(T, V, 2, 3)`` that the grippers do not twist, whatever the second one's z axis is."""
+    return np.stack(_carried(curve, poses)[:2], axis=2)
+
+
 def closing_angles(curve: FloatArray, poses: FloatArray) -> FloatArray:
     """Angles ``(T,)`` [rad] from the first gripper's z axis, carried along without twist, to that of the second one."""
     return _carried(curve, poses)[3]

@@ -10,6 +10,7 @@ from .errors import InputError
 from .material import Material
 from .motion import Motion
 from .parameters import Parameter
+from .scenario import Scenario
 from .scene import Scene
 from .simulator import State
 
@@ -44,8 +45,8 @@ class Effect(ABC):
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
     #: What a simulator must be able to do for it, of :data:`muslin.core.simulator.CAPABILITIES`.
     needs: ClassVar[frozenset[str]] = frozenset()
-    #: Whether it follows from how the object was measured to start, so that it says nothing about other starts.
-    needs_measured_start: ClassVar[bool] = False
+    #: Whether it follows from how a rope was seen to be bent, so that it says nothing where it was not seen whole.
+    needs_kept_bend: ClassVar[bool] = False
     #: Whether it only ever takes energy away from the object.
     dissipative: ClassVar[bool] = False
     #: Whether a diagnosis tries it without being told to.
@@ -79,6 +80,16 @@ class Effect(ABC):
     def on_gravity(self, gravity: FloatArray) -> FloatArray:
         """Gravity ``(3,)`` [m/s2] as this effect turns it."""
         return gravity
+
+    def on_body(self, scenario: Scenario, material: Material, gravity: FloatArray) -> Body:
+        """The object in its rest shape as this effect bends it, of the same elements and lengths.
+
+        Args:
+            scenario: of which the body is to be replaced, moved as all effects have left the command.
+            material: [SI], as all effects have left it.
+            gravity: ``(3,)`` [m/s2], as all effects have left it.
+        """
+        return scenario.body
 
     def on_command(self, motion: Motion, time_step: float) -> Motion:
         """The motion that the grippers really make when told ``motion``; may resample it at ``time_step`` [s]."""

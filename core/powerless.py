@@ -14,8 +14,8 @@ def why_powerless(effect: type[Effect], simulator: Simulator, scenario: Scenario
     if missing:
         what = CAPABILITIES.get(missing[0], repr(missing[0]))
         return f"effect {name!r} needs a simulator that can {what}, but {simulator.name!r} cannot"
-    if effect.needs_measured_start and scenario.start_motion is None:
-        return f"effect {name!r} follows from how the object was seen to start; set [scenario] start = 'measured'"
+    if effect.needs_kept_bend and scenario.kept is None:
+        return f"effect {name!r} follows from how a held rope was seen to be bent; set [scenario] start = 'measured'"
     if effect.acts_on == "contact" and not scenario.obstacles:
         return f"effect {name!r} acts where the object touches something, but there is no obstacle"
     if effect.acts_on in ("grasp", "command") and not scenario.grasps:

@@ -80,6 +80,8 @@ def rollout(
         _check_needs(effect, simulator)
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
         scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
+    for effect in active:
+        scenario = replace(scenario, body=effect.on_body(scenario, material, gravity))
     askew = reduce(lambda turn, effect: effect.on_obstacles(turn), active, IDENTITY_POSE[3:])
     is_askew = not np.array_equal(askew, IDENTITY_POSE[3:])
     if is_askew:  # engines know level obstacles only, so all else is turned until they are

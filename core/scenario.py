@@ -11,6 +11,7 @@ from .beside import Beside
 from .body import Body
 from .camera import Camera
 from .errors import InputError
+from .kept_bend import KeptBend
 from .material import Material, RopeMaterial
 from .measurement import Recording
 from .motion import Motion, inverse, rotate
@@ -69,6 +70,7 @@ class Scenario:
         unit: of what is measured: "px" of that camera, or "m" in the world.
         sampled: the markers are places spread over the object, not spots that are marked on it.
         beside: how far the markers of a rope between two grippers stand beside its axis; None: they sit on it.
+        kept: the bend that a rope that starts as it was measured keeps where nothing acts on it; None: not known.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Scenario:
     unit: PointUnit = "m"
     sampled: bool = False
     beside: Beside | None = None
+    kept: KeptBend | None = None
 
     def __post_init__(self) -> None:
         count = len(self.body.vertices)

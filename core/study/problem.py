@@ -22,6 +22,7 @@ from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
+from ..scenarios.kept import told_bend
 from ..scenarios.standoffs import told_standoffs
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
@@ -142,10 +143,13 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
             "weights = FILE"
         )
     marked, beside = extractor.uses_markers, None
-    if config.scenario.markers == "beside":  # held-out recordings must not tell
+    if config.scenario.markers == "beside":  # held-out recordings must not tell, here and below
         beside = told_standoffs([recordings[n] for n in fit_on])
     scenarios = {n: build_scenario(config.scenario, r, folder, marked, beside) for n, r in recordings.items()}
     kind = scenarios[fit_on[0]].body.kind
+    if config.scenario.start == "measured":
+        kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])
+        scenarios = {n: replace(s, kept=kept) for n, s in scenarios.items()}
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
     for name in config.diagnose.candidates or []:

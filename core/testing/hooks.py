@@ -41,6 +41,11 @@ def check_hooks(effect: type[Effect], kind: str) -> None:
     must(np.isfinite(made.poses).all(), "on_command gives a pose that is not finite")
     still = one.on_command(Motion.still(), 0.005)
     must(still.grippers == 1, "on_command cannot handle a motion of a single pose")
+    scenario = sample_scenario(kind)
+    bent = one.on_body(scenario, material, np.array([0.0, 0.0, -STANDARD_GRAVITY]))
+    same = bent.kind == kind and np.array_equal(bent.elements, scenario.body.elements)
+    must(same, "on_body gives an object of other elements")
+    must(np.allclose(bent.measures, scenario.body.measures, rtol=1e-6), "on_body gives elements of another size")
     body, times = sample_scene(kind).body, np.linspace(0.0, 0.3, 16)
     points = np.random.default_rng(0).normal(0.0, 0.1, (16, 4, 3))
     loads = np.full(len(body.vertices), 1e-3)
@@ -128,7 +133,7 @@ def check_dissipative(effect: type[Effect], kind: str) -> None:
     other hook has a part in it.
     """
     one = effect(**strongest(effect))
-    for hook in ("on_gravity", "on_obstacles", "on_command", "on_loads", "bind_grasp"):
+    for hook in ("on_body", "on_gravity", "on_obstacles", "on_command", "on_loads", "bind_grasp"):
         own = getattr(effect, hook) is not getattr(Effect, hook)
         must(not own, f"it is dissipative, but acts through {hook}, which can add energy")
     material = sample_material(kind)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..body import Body, cloth_grid, rope_line, solid_box
+from ..kept_bend import KeptBend
 from ..material import ClothMaterial, Material, RopeMaterial, SolidMaterial, with_fields
 from ..motion import Motion
 from ..obstacles import Obstacle
@@ -93,4 +94,11 @@ def sample_scenario(kind: str, duration: float = 0.3, obstacles: tuple[Obstacle,
         markers=np.eye(len(body.vertices)),
         load_vertices=np.zeros(0, np.int64),
         obstacles=obstacles,
+        kept=_sample_bend(len(body.vertices)) if kind == "rope" else None,
     )
+
+
+def _sample_bend(count: int) -> KeptBend:
+    """Of a rope that is bent to a radius of 0.5 m where nothing acts on it, whatever it is made of."""
+    shape = np.tile([0.0, 2.0], (count - 2, 1))
+    return KeptBend(shape, 0.0 * shape, np.zeros((2, 4, *shape.shape)))

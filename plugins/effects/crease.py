@@ -5,12 +5,12 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import FloatArray
+from ...core.bending import bending_of
 from ...core.effect import Effect, NodalForce
 from ...core.material import ClothMaterial, RopeMaterial
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
-from .hinges import bending_of
 
 
 class Crease(Effect):

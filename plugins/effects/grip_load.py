@@ -3,11 +3,11 @@
 import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
+from ...core.bending import bending_of
 from ...core.body import Body
 from ...core.material import ClothMaterial, RopeMaterial
 from ...core.scene import Scene
 from .crease import bending_rigidity
-from .hinges import bending_of
 from .stretch import rest_shape
 
 

@@ -5,11 +5,11 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import FloatArray
+from ...core.bending import Bending, SheetBending
 from ...core.effect import Effect, NodalForce
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
-from .hinges import Bending, SheetBending
 
 #: Change of curvature [1/m] over which the friction builds up, where the time step allows so stiff a spring.
 SLIP_CURVATURE = 5.0

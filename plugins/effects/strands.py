@@ -5,13 +5,13 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import FloatArray
+from ...core.bending import RopeBending
 from ...core.effect import Effect, NodalForce
 from ...core.material import RopeMaterial
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
 from .crease import beyond
-from .hinges import RopeBending
 
 
 class RopeHysteresis(Effect):

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from effect_objects import engine
 
+from muslin.core.bending import bending_of
 from muslin.core.body import Body, cloth_grid, rope_line
 from muslin.core.material import ClothMaterial, RopeMaterial
 from muslin.core.scene import Scene
 from muslin.core.simulator import State
 from muslin.plugins.effects.crease import Crease
-from muslin.plugins.effects.hinges import bending_of
 
 RADIUS = 0.1
 FLAP = Body(

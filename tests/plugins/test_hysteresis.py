@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from effect_objects import G, engine
 
+from muslin.core.bending import SheetBending
 from muslin.core.body import Body, cloth_grid
 from muslin.core.material import ClothMaterial
 from muslin.core.scene import Scene
 from muslin.core.simulator import State
 from muslin.core.testing.reference import ReferenceSimulator
-from muslin.plugins.effects.hinges import SheetBending
 from muslin.plugins.effects.hysteresis import SLIP_CURVATURE, BendingHysteresis
 
 FRICTION = 3e-4

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from effect_objects import G, engine
 
+from muslin.core.bending import RopeBending
 from muslin.core.body import rope_line
 from muslin.core.material import RopeMaterial
 from muslin.core.scene import Scene
 from muslin.core.simulator import State
-from muslin.plugins.effects.hinges import RopeBending
 from muslin.plugins.effects.strands import RopeHysteresis
 
 #: One hinge between two segments.

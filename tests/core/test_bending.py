@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from muslin.core.bending import bending_of
 from muslin.core.body import Body, cloth_grid, rope_line
-from muslin.plugins.effects.hinges import bending_of
 
 SHEET = cloth_grid(0.3, 0.3, 9, 9)
 ROPE = rope_line(np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]), 9)

@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray, cross
-from ...core.body import Body
+from .arrays import FloatArray, IntArray, cross
+from .body import Body
+from .clamps import clamped_segments
 
 #: Share of a hinge's bending that goes to either end of its edge and to either opposite vertex.
 _SHARES = np.array([1 / 3, 1 / 3, 1 / 6, 1 / 6])
@@ -134,7 +135,7 @@ class RopeBending(Bending):
 
     def __init__(self, body: Body, held: IntArray = _NONE) -> None:
         self._lengths = body.measures
-        bends = np.where(np.isin(body.elements, held).all(axis=1), 0.0, body.measures)
+        bends = np.where(clamped_segments(body, held), 0.0, body.measures)
         bends = bends[1:] + bends[:-1]
         self.measures = 0.5 * np.where(bends > 0, bends, body.measures[1:] + body.measures[:-1])
         tangent = np.diff(body.vertices, axis=0)
@@ -176,6 +177,11 @@ class RopeBending(Bending):
         out[1:-1] += behind + before
         out[:-2] -= before
         return out
+
+    @property
+    def axes(self) -> FloatArray:
+        """The axes that the two numbers of a curvature go with, as the rope was last followed ``(N, 2, 3)``."""
+        return np.stack([self._first, self._second], axis=1)
 
     def _in_frame(self, vectors: FloatArray) -> FloatArray:
         return np.stack([np.sum(vectors * self._first, axis=1), np.sum(vectors * self._second, axis=1)], axis=1)

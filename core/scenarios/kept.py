@@ -1,0 +1,94 @@
+"""The bend that a rope keeps, the same in all recordings of it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..bending import RopeBending
+from ..beside import untwisted_frames
+from ..body import Body
+from ..kept_bend import KeptBend, kept_in
+from ..material import RopeMaterial
+from ..measurement import Recording
+from ..motion import inverse, rotate
+from ..scenario import Scenario
+from .measured import measured_start
+
+#: States of a rope are taken so far apart [s]: nearer ones show the same bends.
+_APART = 0.5
+#: So many frames after a state tell how it moves there.
+_FRAMES = 10
+_ANY = RopeMaterial(linear_density=1.0, stretch_stiffness=1.0, bending_rigidity=1.0)
+
+
+def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) -> KeptBend | None:
+    """The mean over states all along ``recordings`` of one rope, in the frames of :func:`untwisted_frames`.
+
+    A natural curvature is a property of the rope and turns with its material, which the first gripper holds; what
+    friction between its strands and errors of the markers add differs from state to state.
+
+    Args:
+        scenarios: of the recordings, each of which starts as it was measured.
+        recordings: what was seen.
+
+    Returns:
+        None where no gripper says how the rope is turned about itself.
+    """
+    if not all(s.grasps and s.body.kind == "rope" and len(s.body.vertices) > 2 for s in scenarios):
+        return None
+    states = [state for s, r in zip(scenarios, recordings, strict=True) for state in _states(s, r)]
+    return KeptBend.mean([_told(s) for s in states])
+
+
+def bent(scenario: Scenario, curvature: FloatArray) -> Body:
+    """The rope of a scenario, bent by ``curvature (V - 2, 2)`` [1/m] at rest, in the frame of the first gripper.
+
+    Its first segment lies as at the start, and so do its axes there.
+    """
+    body, start = scenario.body, scenario.start_vertices()
+    poses = scenario.motion.at(scenario.times[:1])
+    frame = _frames(start, poses)[0]
+    turns = curvature * RopeBending(body, np.concatenate(scenario.grasps)).measures[:, None]
+    along = np.cross(*frame)
+    steps = [along]
+    for turn in turns:
+        axis = turn @ frame
+        angle = float(np.linalg.norm(axis))
+        if angle > 0:
+            quaternion = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis / angle])
+            frame, along = rotate(quaternion, frame), rotate(quaternion, along)
+        steps.append(along)
+    points = start[0] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps * body.measures[:, None], axis=0)])
+    return replace(body, vertices=rotate(inverse(poses[0, 0, 3:]), points - poses[0, 0, :3]))
+
+
+def _states(scenario: Scenario, recording: Recording) -> list[Scenario]:
+    """The rope as it starts, and then wherever every marker is seen, some time apart."""
+    series = recording.series
+    whole = np.isfinite(series.points).all(axis=(1, 2))
+    late = np.floor((series.time - series.time[0]) / _APART + 1e-9)
+    out = [scenario]
+    for part in np.unique(late)[1:]:
+        found = np.flatnonzero(whole & (late == part))
+        if not len(found) or found[0] + _FRAMES > len(series.time):
+            continue
+        rest = slice(found[0], None)
+        cut = replace(recording, series=replace(series, time=series.time[rest], points=series.points[rest]))
+        out.append(measured_start(replace(scenario, times=series.time[rest]), cut, scenario.beside))
+    return out
+
+
+def _told(scenario: Scenario) -> KeptBend:
+    """From the start of one; by unit of mass and gravity, so neither the material nor gravity counts."""
+    scene = scenario.scene(_ANY, np.zeros(3))
+    bending = RopeBending(scene.body, scene.held)
+    bending.follow(scene.start_positions)
+    frames = _frames(scene.start_positions, scenario.motion.at(scenario.times[:1]))
+    return kept_in(scene, bending).turned(bending.axes, frames[1:-1])
+
+
+def _frames(vertices: FloatArray, poses: FloatArray) -> FloatArray:
+    """Axes ``(V, 2, 3)`` of the cross-sections that go along from the first gripper without twist."""
+    return np.asarray(untwisted_frames(vertices[None], poses[:, [0, -1]])[0])

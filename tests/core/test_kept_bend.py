@@ -1,0 +1,151 @@
+"""The bend that a rope keeps, as it follows from states that it was seen in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from muslin.core.arrays import FloatArray
+from muslin.core.bending import RopeBending
+from muslin.core.beside import untwisted_frames
+from muslin.core.body import rope_line
+from muslin.core.kept_bend import kept_in
+from muslin.core.material import RopeMaterial
+from muslin.core.measurement import Recording
+from muslin.core.motion import Motion, rotate
+from muslin.core.scenario import Scenario
+from muslin.core.scenarios import preset
+from muslin.core.scenarios.kept import bent, told_bend
+from muslin.core.scenarios.measured import measured_start
+from muslin.core.scene import Scene
+from muslin.core.series import PointSeries
+
+MATERIAL = RopeMaterial(linear_density=0.05, stretch_stiffness=2000.0, bending_rigidity=2e-3, twist_rigidity=2e-3)
+
+
+def test_an_arc_without_weight_is_all_natural_curvature_or_none() -> None:
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 21)
+    # segments that are held at both ends are straight, so the arc turns there by what half a segment turns
+    turn = np.concatenate([[0.0, 0.5], np.ones(17), [0.5]])
+    angle = 0.05 * np.cumsum(turn)
+    steps = 0.05 * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    arc = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    free = Scene(body, MATERIAL, np.zeros(3), (np.array([0, 1]),), np.zeros(21), (), arc)
+    held = replace(free, grasps=(np.array([0, 1]), np.array([19, 20])))
+
+    def bend_of(scene: Scene) -> FloatArray:
+        bending = RopeBending(body, scene.held)
+        bending.follow(arc)
+        return kept_in(scene, bending).curvature(MATERIAL, scene.gravity)
+
+    # clamped at one end alone nothing but its own bend can hold it in this shape; clamped at both the ends can
+    np.testing.assert_allclose(np.linalg.norm(bend_of(free), axis=1)[:-1], 1.0, rtol=1e-6)
+    assert np.abs(bend_of(held)).max() < 1e-6
+
+
+def test_what_moves_freely_needs_no_bend() -> None:
+    """In free fall the acceleration is the weight's, so a straight rope is in balance however light it is."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 21)
+    gravity = np.array([0.0, 0.0, -9.81])
+    held = (np.array([0, 1]),)
+    falling = Scene(body, MATERIAL, gravity, held, np.zeros(21), start_accelerations=np.tile(gravity, (21, 1)))
+    bending = RopeBending(body, falling.held)
+    assert np.abs(kept_in(falling, bending).curvature(MATERIAL, gravity)).max() < 1e-9
+    still = replace(falling, start_accelerations=None)
+    # at rest, sticking out from the clamp, its bend carries the weight of all that is beyond: m = w (l - x)^2 / 2
+    moment = 2e-3 * np.linalg.norm(kept_in(still, bending).curvature(MATERIAL, gravity), axis=1)
+    np.testing.assert_allclose(moment, 0.05 * 9.81 * 0.5 * (1.0 - np.arange(1, 20) / 20) ** 2, rtol=1e-6)
+
+
+def test_what_damping_gives_is_no_bend() -> None:
+    """A straight rope without weight that starts to bend, with the acceleration that its damping then gives it."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 21)
+    masses, beta = 0.05 * body.vertex_measures, 0.02
+    held = (np.array([0, 1]),)
+    bending = RopeBending(body, held[0])
+    x = body.vertices[:, 0]
+    velocities = np.stack([0 * x, 0 * x, np.maximum(x - 0.1, 0.0) ** 2 * (1.0 - x)], axis=1)
+    forces = bending.forces(2e-3 * beta * bending.rates(velocities))
+    bent = Scene(
+        body,
+        replace(MATERIAL, damping_time=beta),
+        np.zeros(3),
+        held,
+        np.zeros(21),
+        start_velocities=velocities,
+        start_accelerations=forces / masses[:, None],
+    )
+    kept = kept_in(bent, bending)
+    assert np.abs(kept.curvature(replace(MATERIAL, damping_time=beta), bent.gravity)).max() < 1e-9
+    undamped = kept.curvature(MATERIAL, bent.gravity)
+    assert np.abs(undamped).max() > 0.5 * beta * np.abs(bending.rates(velocities)).max()
+
+
+def carried(turn: FloatArray) -> tuple[Scenario, Recording]:
+    """An arc of 0.4 rad without weight, held at the first end alone, turned as a whole by ``turn`` (w x y z)."""
+    steps = np.linspace(0.0, 0.4, 12)
+    segments = 0.05 * np.stack([np.cos(steps), np.sin(steps), 0 * steps], axis=1)
+    points = rotate(turn, np.concatenate([np.zeros((1, 3)), np.cumsum(segments, axis=0)]))
+    time = np.arange(0.0, 1.2, 0.02)
+    poses = np.tile(np.concatenate([points[0], turn]), (len(time), 1, 1))
+    recording = Recording("arc", PointSeries(time, np.tile(points, (len(time), 1, 1))), Motion(time, poses))
+    plain = replace(preset("cable").scenario((1.0,), (25,)), grasps=(np.array([0, 1]),))
+    return measured_start(plain.for_recording(recording), recording), recording
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
+def test_it_turns_with_the_gripper(turn: tuple[float, ...]) -> None:
+    """So however a rope is held, all its recordings tell the same."""
+    unit = np.array(turn) / np.linalg.norm(turn)
+    weightless = np.zeros(3)
+    level = told_bend(*([x] for x in carried(np.array([1.0, 0.0, 0.0, 0.0]))))
+    turned = told_bend(*([x] for x in carried(unit)))
+    assert level is not None
+    assert turned is not None
+    found = level.curvature(MATERIAL, weightless)
+    # the z axis of the gripper stands across the arc, about which it turns to the left
+    np.testing.assert_allclose(np.median(found, axis=0), [0.4 / 0.55, 0.0], atol=0.03)
+    np.testing.assert_allclose(turned.curvature(MATERIAL, weightless), found, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [0.5, 4.0])
+def test_a_bent_body_has_the_curvature_that_it_was_given(size: float) -> None:
+    scenario, _ = carried(np.array([0.8, 0.0, 0.6, 0.0]))
+    wanted = size * np.random.default_rng(0).normal(size=(23, 2))
+    body = bent(scenario, wanted)
+    np.testing.assert_allclose(body.measures, scenario.body.measures, rtol=1e-9)
+    world = replace(scenario, body=body).world_vertices()
+    start = scenario.start_vertices()
+    np.testing.assert_allclose(world[1] - world[0], start[1] - start[0], atol=1e-4)
+    bending = RopeBending(replace(body, vertices=world), scenario.grasps[0])
+    frames = untwisted_frames(world[None], scenario.motion.at(scenario.times[:1])[:, [0, 0]])[0, 1:-1]
+    got = np.einsum("na,nax,nbx->nb", bending.rest, bending.axes, frames)
+    np.testing.assert_allclose(got, wanted, atol=0.02 * size)
+
+
+def test_a_rope_that_no_gripper_holds_tells_nothing() -> None:
+    """There is then nothing that its recordings have in common about which way it is bent."""
+    scenario, recording = carried(np.array([1.0, 0.0, 0.0, 0.0]))
+    assert told_bend([replace(scenario, grasps=())], [recording]) is None
+
+
+def test_states_are_looked_at_all_along_a_recording() -> None:
+    """What friction and markers put in differs from state to state; frames that miss a marker are passed over."""
+    scenario, recording = carried(np.array([1.0, 0.0, 0.0, 0.0]))
+    series = recording.series
+    points = series.points.copy()
+    points[series.time > 0.45] += 0.002 * np.random.default_rng(0).normal(size=points[0].shape)
+    missed = points.copy()
+    missed[np.isclose(series.time, 0.5), 3] = np.nan
+    first, mixed, passed = (
+        told_bend([scenario], [replace(recording, series=replace(series, points=x))])
+        for x in (series.points, points, missed)
+    )
+    assert first is not None
+    assert mixed is not None
+    assert passed is not None
+    assert np.abs(mixed.shape - first.shape).max() > 0.01
+    np.testing.assert_allclose(passed.shape, mixed.shape, atol=1e-9)
