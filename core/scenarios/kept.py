@@ -20,6 +20,8 @@ from .measured import measured_start
 _APART = 0.5
 #: So many frames after a state tell how it moves there.
 _FRAMES = 10
+#: A state that is so many times as far from the median as half of them are is that of markers gone wrong.
+_FAR = 6.0
 _ANY = RopeMaterial(linear_density=1.0, stretch_stiffness=1.0, bending_rigidity=1.0)
 
 
@@ -27,7 +29,7 @@ def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) ->
     """The mean over states all along ``recordings`` of one rope, in the frames of :func:`untwisted_frames`.
 
     A natural curvature is a property of the rope and turns with its material, which the first gripper holds; what
-    friction between its strands and errors of the markers add differs from state to state.
+    friction between its strands and errors of the markers add differs from state to state. States far off are left out.
 
     Args:
         scenarios: of the recordings, each of which starts as it was measured.
@@ -39,7 +41,11 @@ def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) ->
     if not all(s.grasps and s.body.kind == "rope" and len(s.body.vertices) > 2 for s in scenarios):
         return None
     states = [state for s, r in zip(scenarios, recordings, strict=True) for state in _states(s, r)]
-    return KeptBend.mean([_told(s) for s in states])
+    told = [_told(s) for s in states]
+    shapes = np.array([t.shape for t in told])
+    away = np.sqrt(np.mean((shapes - np.median(shapes, axis=0)) ** 2, axis=(1, 2)))
+    usual = _FAR * float(np.median(away))
+    return KeptBend.mean([t for t, a in zip(told, away, strict=True) if a <= usual])
 
 
 def bent(scenario: Scenario, curvature: FloatArray) -> Body:
@@ -67,7 +73,8 @@ def bent(scenario: Scenario, curvature: FloatArray) -> Body:
 def _states(scenario: Scenario, recording: Recording) -> list[Scenario]:
     """The rope as it starts, and then wherever every marker is seen, some time apart."""
     series = recording.series
-    whole = np.isfinite(series.points).all(axis=(1, 2))
+    apart = np.linalg.norm(np.diff(series.points, axis=1), axis=2)
+    whole = (apart > 0).all(axis=1)  # a comparison with NaN is false
     late = np.floor((series.time - series.time[0]) / _APART + 1e-9)
     out = [scenario]
     for part in np.unique(late)[1:]:

@@ -149,3 +149,21 @@ def test_states_are_looked_at_all_along_a_recording() -> None:
     assert passed is not None
     assert np.abs(mixed.shape - first.shape).max() > 0.01
     np.testing.assert_allclose(passed.shape, mixed.shape, atol=1e-9)
+
+
+def test_a_state_of_swapped_markers_tells_nothing() -> None:
+    scenario, recording = carried(np.array([1.0, 0.0, 0.0, 0.0]))
+    series = recording.series
+    rng = np.random.default_rng(1)
+    noise = 0.0005 * rng.normal(size=(3, len(series.time), *series.points.shape[1:]))
+    takes = series.points + noise[:, ::5].repeat(5, axis=1)
+    swapped = takes.copy()
+    swapped[0, 25, [4, 5]] = takes[0, 25, [5, 4]]  # the second state that is looked at
+
+    def told(points: FloatArray) -> FloatArray:
+        recordings = [replace(recording, series=replace(series, points=p)) for p in points]
+        made = told_bend([measured_start(scenario, r) for r in recordings], recordings)
+        assert made is not None
+        return made.shape
+
+    assert np.abs(told(swapped) - told(takes)).max() < 0.3
