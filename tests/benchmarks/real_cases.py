@@ -129,6 +129,19 @@ def cable(number: int) -> Case:
     return Case(f"cable {number}", path, make, open_loop=True, picture=True)
 
 
+def bent(case: Case) -> Case:
+    """The same with the bend that the cable keeps, whatever a diagnosis says."""
+
+    def make(folder: Path, workers: int | None) -> Study:
+        study = case.make(folder, workers).add("rest-curvature")
+        config = study.config.model_copy(deep=True)
+        config.diagnose.simulations = 800
+        write_config(config, study.path)
+        return Study.load(study.path, workers=workers)
+
+    return replace(case, name=f"{case.name}, bent", make=make)
+
+
 def carried_cloth(folder: Path, workers: int | None) -> Study:
     """All takes of one day, of which the study fits three and holds three out."""
     config = read_config(EXAMPLES / "carried_cloth/study.toml")
@@ -174,6 +187,7 @@ CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
     *(BEAM, replace(on_pybullet(BEAM), picture=True)),
     *CABLES,
+    *(bent(case) for case in CABLES[:2]),
     *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
     *(CARRIED, IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
