@@ -25,7 +25,10 @@ class _OpenTable(BaseModel):
 
 
 class StudyTable(StrictTable):
-    """``[study]``: what is fitted on what; a simulation that takes longer than ``time_limit`` [s] has failed."""
+    """``[study]``: what is fitted on what; a simulation that takes longer than ``time_limit`` [s] has failed.
+
+    With ``window`` [s] recordings are fitted in pieces of about that length, each of which starts as measured.
+    """
 
     measurement: str
     fit_on: list[str] | None = None
@@ -33,6 +36,7 @@ class StudyTable(StrictTable):
     results: str | None = None
     seed: int = Field(default=0, ge=0)
     time_limit: float = Field(default=120.0, gt=0)
+    window: float | None = Field(default=None, gt=0)
 
 
 class EstimatorTable(_OpenTable):
@@ -108,6 +112,15 @@ class StudyConfig(StrictTable):
         both = sorted(set(self.study.fit_on or []) & set(self.study.hold_out))
         if both:
             raise ValueError(f"recording {', '.join(both)} is both fitted on and held out")
+        return self
+
+    @model_validator(mode="after")
+    def _pieces_start_as_measured(self) -> "StudyConfig":
+        if self.study.window is not None and self.scenario.start != "measured":
+            raise ValueError(
+                "study.window cuts recordings into pieces that start as they were measured, so it needs [scenario] "
+                "start = 'measured'"
+            )
         return self
 
     @model_validator(mode="after")

@@ -28,6 +28,7 @@ from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
 from .objects import build_scenario, check_unstretched
+from .windows import pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +131,11 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     hold_out = tuple(config.study.hold_out)
     if not fit_on:
         raise InputError("[study.fit_on]: nothing is left to fit on, every recording is held out")
-    used = {n: measurement[n] for n in (*fit_on, *hold_out)}
+    held, fitted = [measurement[n] for n in hold_out], [measurement[n] for n in fit_on]
+    if (length := config.study.window) is not None:
+        fitted = [piece for r in fitted for piece in pieces(r, length)]
+        fit_on = tuple(r.name for r in fitted)
+    used = {r.name: r for r in (*fitted, *held)}
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
     options = dict(config.extractor.options)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from real_cases import CASES, ROOT, Case
-from real_measures import measures, open_loop
+from real_measures import fitted_takes, measures, open_loop
 from table import RESULTS, commit, machine, versions
 
 from muslin.cli.report import overview_figure
@@ -41,7 +41,7 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
     states = {"unfitted": (study, middle), "fitted": (study, fit.values())}
     row: dict[str, Any] = {
         "set": case.name,
-        "fitted on": list(study.problem.fit_on),
+        "fitted on": fitted_takes(study),
         "held out": list(study.problem.hold_out),
         "baseline": rms([r.baseline for r in held]),
         "unfitted": rms([r.default for r in held]),

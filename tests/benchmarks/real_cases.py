@@ -129,17 +129,18 @@ def cable(number: int) -> Case:
     return Case(f"cable {number}", path, make, open_loop=True, picture=True)
 
 
-def bent(case: Case) -> Case:
-    """The same with the bend that the cable keeps, whatever a diagnosis says."""
+def bent(case: Case, window: float | None = None) -> Case:
+    """The same with the bend that the cable keeps, whatever a diagnosis says, fitted in pieces of ``window`` [s]."""
 
     def make(folder: Path, workers: int | None) -> Study:
         study = case.make(folder, workers).add("rest-curvature")
         config = study.config.model_copy(deep=True)
+        config.study.window = window
         config.diagnose.simulations = 800
         write_config(config, study.path)
         return Study.load(study.path, workers=workers)
 
-    return replace(case, name=f"{case.name}, bent", make=make)
+    return replace(case, name=f"{case.name}, bent" + (", in pieces" if window else ""), make=make)
 
 
 def carried_cloth(folder: Path, workers: int | None) -> Study:
@@ -187,7 +188,7 @@ CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
     *(BEAM, replace(on_pybullet(BEAM), picture=True)),
     *CABLES,
-    *(bent(case) for case in CABLES[:2]),
+    *(bent(CABLES[0]), bent(CABLES[0], window=1.25), bent(CABLES[1])),
     *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
     *(CARRIED, IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),

@@ -20,6 +20,11 @@ _RESAMPLES, _BLOCK = 2000, 1.0
 _QUANTILE_95 = 1.6449
 
 
+def fitted_takes(study: Study) -> list[str]:
+    """Names of the recordings that a study fits, whole or in pieces."""
+    return list(study.config.study.fit_on or study.problem.fit_on)
+
+
 def absolute(problem: Problem, values: Mapping[str, float]) -> dict[str, Any]:
     """Errors [m] on the held-out takes of ``problem``, no offset taken out.
 
@@ -131,7 +136,7 @@ def _sums(distance: FloatArray, time: FloatArray) -> FloatArray:
 
 def never_used(study: Study) -> Problem | None:
     """Of the takes that are in the measurement and neither fitted nor held out, as held-out ones; None without any."""
-    known = {*study.problem.fit_on, *study.problem.hold_out}
+    known = {*fitted_takes(study), *study.problem.hold_out}
     left = [n for n in study.measurement.names if n not in known]
     if not left:
         return None

@@ -59,6 +59,21 @@ def test_every_take_starts_where_it_was_measured(tmp_path: Path) -> None:
     assert np.abs(ends).max() < 0.002  # held where the grippers are
 
 
+def test_takes_that_are_fitted_can_be_cut_and_held_out_ones_stay_whole(tmp_path: Path) -> None:
+    measured(tmp_path, [bent(k) for k in range(len(NAMES))])
+    path = tmp_path / "study.toml"
+    path.write_text(path.read_text().replace("[study]", "[study]\nwindow = 0.25"))
+    problem = Study.load(path, workers=0).problem
+    assert problem.fit_on[:2] == ("97 from 0 s", "97 from 0.25 s")
+    assert len(problem.fit_on) == 2 * len(FITTED) and problem.hold_out == NAMES[5:]
+    values = {"bending_rigidity": 1e-3, "twist_rigidity": 1e-3, "damping_time": 0.02}
+    for name in ("97 from 0.25 s", "87"):
+        recording = problem.recordings[name].series
+        made = problem.simulate(values, name).series
+        np.testing.assert_array_equal(made.time, recording.time)
+        assert np.linalg.norm(made.points[0] - recording.points[0], axis=1).max() < 0.002
+
+
 def test_the_real_takes_of_the_example_are_there_and_can_be_simulated(tmp_path: Path) -> None:
     path = published("cable/cable1.npz")
     with warnings.catch_warnings():
