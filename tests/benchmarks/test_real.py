@@ -99,8 +99,11 @@ def study_of(rmse: float, simulations: int) -> Any:
     return SimpleNamespace(
         fit=lambda: SimpleNamespace(noise=noise, simulations=simulations, values=lambda: {"stiffness": 3.0}),
         compare=lambda: SimpleNamespace(rows=[SimpleNamespace(role="held-out", baseline=0.3, default=0.2, rmse=rmse)]),
+        config=SimpleNamespace(study=SimpleNamespace(fit_on=["a"])),
         problem=SimpleNamespace(
-            fit_on=("a",), hold_out=("b",), space=ParameterSpace([Parameter("stiffness", "N/m", 1.0, 5.0)])
+            fit_on=("a from 0 s", "a from 1 s"),
+            hold_out=("b",),
+            space=ParameterSpace([Parameter("stiffness", "N/m", 1.0, 5.0)]),
         ),
     )
 
