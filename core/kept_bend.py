@@ -21,9 +21,9 @@ class KeptBend:
 
     Args:
         shape: what a rope keeps if it carries nothing ``(N, 2)`` [1/m].
-        rates: what it keeps less per damping time ``(N, 2)`` [1/(m s)].
-        moments: that what it carries bends it by ``(2, 4, N, 2)``: the mass of the rope, per linear density
-            [N m2/kg], and the loads [N m], first by their acceleration, then by gravity of 1 m/s2 along x, y and z.
+        rates: what the damping of a bend that changes adds to that, per damping time ``(N, 2)`` [1/(m s)].
+        moments: that what it carries bends it by ``(2, 4, N, 2)``: the rope's own mass, at 1 kg/m,
+            and the loads; first for their acceleration [N m], then for a gravity of -1 m/s2 along x, y and z each.
     """
 
     shape: FloatArray

@@ -111,7 +111,7 @@ class MujocoWorld(World):
         np.subtract(held.ravel(), self._rest_held, out=self._target_held)
         if self._turn is not None:
             self._target_held[:] = (self._target_held.reshape(-1, 3) @ self._turn).ravel()
-        if turns is not None:
+        if turns is not None and len(self._start_turns):  # a rope of one segment has no twist
             np.add(self._start_turns, turns, out=self._target_turns)
         velocity = (self._target - qpos[commanded]) / self.time_step
         qvel[commanded] = velocity

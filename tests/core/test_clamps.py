@@ -72,3 +72,11 @@ def test_a_gripper_that_turns_takes_a_bent_rope_round() -> None:
         rigid[-1] - (rotate(about(np.array([0.0, 0.0, 1.0]), 0.5), arc.vertices) + 0.1 * X), axis=1
     )
     assert unturned.max() > 0.1
+
+
+def test_a_rope_of_one_segment_has_no_twist_to_turn() -> None:
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), 2)
+    poses = np.concatenate([np.zeros((201, 3)), about(X, 2.0 * CLOCK)], axis=1)[:, None]
+    scenario = Scenario("one", body, (np.array([0, 1]),), Motion(CLOCK, poses), CLOCK, np.eye(2), np.zeros(0, np.int64))
+    seen = rollout(MujocoSimulator(), scenario, RopeMaterial()).series.points
+    np.testing.assert_allclose(seen, np.tile(body.vertices, (201, 1, 1)), atol=1e-9)
