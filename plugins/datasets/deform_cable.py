@@ -14,7 +14,7 @@ from ...core.measurement import Recording
 from ...core.motion import Motion
 from ...core.series import PointSeries
 from .carried_turns import carried_turns
-from .marker_faults import lost_frames, wrong_markers
+from .marker_faults import lost_frames, put_back, wrong_markers
 
 #: Along this axis of its gripper the cable leaves it.
 _ALONG = np.array([1.0, 0.0, 0.0])
@@ -26,9 +26,9 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
     ``clamped`` are the outer and inner marker of the first end, then the inner and outer of the last. A gripper is
     where the outer one is, and turns as the pair turns, about no axis but that of the shortest rotation from frame to
     frame (what a marker pair does not show is the turn about itself); the x axis of the first points along the cable,
-    that of the second against it. Frames that the motion capture lost are put back on the clock, not in the data;
-    markers that cannot be where they seem to be are NaN. Where the whole cable jumps farther than lost frames
-    explain, it is said and left.
+    that of the second against it. Clamped markers of one end that were taken for one another are put back. Frames that
+    the motion capture lost are put back on the clock, not in the data; markers that cannot be where they seem to be are
+    NaN. Where the whole cable jumps farther than lost frames explain, it is said and left.
 
     References:
         Chen, Zhang, Brei, Vasudevan and others, *Differentiable discrete elastic rods for real-time modeling of
@@ -72,12 +72,14 @@ def _names(given: npt.NDArray[Any], takes: int, path: Path) -> list[str]:
 
 
 def _recording(markers: FloatArray, clamped: IntArray, step: float, name: str) -> Recording:
-    markers = np.where(np.isfinite(markers), markers, np.nan)
+    markers, swapped = put_back(np.where(np.isfinite(markers), markers, np.nan), clamped)
     missing, jumped = lost_frames(markers)
     wrong = wrong_markers(markers)
     time: FloatArray = step * (np.arange(len(markers)) + np.cumsum(missing)).astype(np.float64)
     if missing.any():
         note(f"{name}: {int(missing.sum())} lost frames put back on the clock, at {_times(time[missing > 0])}")
+    if swapped.any():
+        note(f"{name}: two clamped markers put back that were taken for one another, at {_times(time[swapped])}")
     if jumped.any():
         note(f"{name}: the whole cable jumps at {_times(time[jumped])}, which no lost frames explain; left as it is")
     if wrong.any():

@@ -22,6 +22,8 @@ WRONG_DEVIATIONS = 6.0
 #: Which of two neighbours is wrong, their distances to so many markers along the cable tell. A sharp bend shortens the
 #: longer of these, too, so they alone make no frame wrong.
 REACH = 3
+#: Two markers of a gripper changed places if the wrong one is nearer to the cable by more than this [m].
+ORDER_MARGIN = 0.005
 #: A marker jumps if it goes by this much more than most markers do, and back in the next frame [m].
 JUMP = 0.02
 
@@ -51,6 +53,28 @@ def lost_frames(markers: FloatArray) -> tuple[IntArray, BoolArray]:
     missing[at[possible]] = np.maximum(count[possible], 0)
     jumped[at[~possible]] = True
     return missing, jumped
+
+
+def put_back(markers: FloatArray, clamped: IntArray) -> tuple[FloatArray, BoolArray]:
+    """The markers with those of each gripper in their order, and in which frames ``(T,)`` they were not.
+
+    A cable leaves its gripper on the side of the inner marker, so the next marker on the cable is nearer to that one,
+    unless the two were taken for one another.
+
+    Args:
+        markers: ``(T, P, 3)`` [m], NaN where one was not seen.
+        clamped: outer and inner marker of the first end, inner and outer of the last, from 0.
+    """
+    out, swapped = markers.copy(), np.zeros(len(markers), bool)
+    for outer, inner in (clamped[:2], clamped[:1:-1]):
+        beyond = inner + (1 if inner > outer else -1)
+        if beyond in clamped or not 0 <= beyond < markers.shape[1]:
+            continue
+        to_inner, to_outer = (np.linalg.norm(markers[:, beyond] - markers[:, m], axis=1) for m in (inner, outer))
+        wrong = to_inner > to_outer + ORDER_MARGIN  # a comparison with NaN is false
+        out[wrong, outer], out[wrong, inner] = markers[wrong, inner], markers[wrong, outer]
+        swapped |= wrong
+    return out, swapped
 
 
 def wrong_markers(markers: FloatArray) -> BoolArray:
