@@ -81,7 +81,10 @@ class NuisanceTable(StrictTable):
 
 
 class DiagnoseTable(StrictTable):
-    """``[diagnose]``: which effects to try, from how many points each at most, with how many simulations in all."""
+    """``[diagnose]``: which effects to try, from how many points each at most, with how many simulations in all.
+
+    Those of all pieces that a recording is cut into (``[study] window``) count as one.
+    """
 
     candidates: list[str] | None = None
     draws: int = Field(default=16, ge=4)

@@ -28,7 +28,7 @@ from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
 from .objects import build_scenario, check_unstretched
-from .windows import pieces
+from .windows import cut_up
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,7 @@ class Problem:
         fixed: values of effect coefficients that are not inferred.
         effects: classes of every effect that a value may name.
         time_limit: on the computation of one rollout [s]; None for none.
+        pieces: into how many a recording that is fitted was cut, in the mean.
     """
 
     recordings: dict[str, Recording]
@@ -58,6 +59,7 @@ class Problem:
     fixed: dict[str, float]
     effects: dict[str, type[Effect]]
     time_limit: float | None = None
+    pieces: float = 1.0
 
     def simulate(self, values: Mapping[str, float], recording: str) -> Trajectory:
         """One rollout; ``values`` names material fields, ``scale``, and ``effect.coefficient``.
@@ -132,9 +134,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if not fit_on:
         raise InputError("[study.fit_on]: nothing is left to fit on, every recording is held out")
     held, fitted = [measurement[n] for n in hold_out], [measurement[n] for n in fit_on]
+    cuts = 1.0
     if (length := config.study.window) is not None:
-        fitted = [piece for r in fitted for piece in pieces(r, length)]
-        fit_on = tuple(r.name for r in fitted)
+        fitted = [piece for r in fitted for piece in cut_up(r, length)]
+        cuts, fit_on = len(fitted) / len(fit_on), tuple(r.name for r in fitted)
     used = {r.name: r for r in (*fitted, *held)}
     base = preset(config.scenario.name)
     recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
@@ -179,7 +182,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
             _check_start(simulator, scenario, material, scale, name)
     limit = config.study.time_limit
     return Problem(
-        recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects, limit
+        recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects, limit, cuts
     )
 
 

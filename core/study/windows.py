@@ -12,7 +12,7 @@ from ..measurement import Recording
 _FEWEST = 10
 
 
-def pieces(recording: Recording, length: float) -> list[Recording]:
+def cut_up(recording: Recording, length: float) -> list[Recording]:
     """``recording`` cut into pieces of about ``length`` [s], all of the same share of it.
 
     Small errors grow in what moves fast, until what a model does after seconds is left to chance, whatever its

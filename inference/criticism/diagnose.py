@@ -46,7 +46,7 @@ def diagnose(study: Study) -> Diagnosis:
         plain = found.first.plain
         joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
         found = replace(found, after=joint.nearest)
-        count = work.count
+        count = work.simulations
     result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
     paragraphs = explain(result)

@@ -35,7 +35,7 @@ class Work:
         discrepancy: how far the model's own numbers may be off, as last seen.
         rough: what it cannot repeat, as last seen.
         moved: how far its own numbers move the model as it is, see :class:`~.numerics.Numerics`.
-        limit: of rollouts.
+        limit: of rollouts, see :attr:`simulations`.
         cut_short: whether something was left out for want of them.
     """
 
@@ -43,7 +43,7 @@ class Work:
         self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-        self.limit = int((1 - RESERVED) * study.config.diagnose.simulations)
+        self.limit = int((1 - RESERVED) * study.config.diagnose.simulations * problem.pieces)
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})
@@ -55,6 +55,11 @@ class Work:
     def count(self) -> int:
         """Rollouts so far."""
         return self.pool.count + self._elsewhere
+
+    @property
+    def simulations(self) -> int:
+        """What those are told as: the pieces of a recording cost as much as the whole, so they count as one."""
+        return round(self.count / self.problem.pieces)
 
     def may_go_on(self, until: float = float("inf")) -> bool:
         """Is something left of the budget, ``until`` so many? That it was not is remembered: :attr:`cut_short`."""

@@ -10,7 +10,7 @@ from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
 from muslin.core.series import PointSeries
 from muslin.core.study.config import parse_config
-from muslin.core.study.windows import pieces
+from muslin.core.study.windows import cut_up
 
 
 def take(frames: int) -> Recording:
@@ -22,7 +22,7 @@ def take(frames: int) -> Recording:
 @given(st.integers(30, 600), st.floats(0.15, 20.0))
 def test_pieces_are_the_whole_recording_in_order(frames: int, length: float) -> None:
     whole = take(frames)
-    found = pieces(whole, length)
+    found = cut_up(whole, length)
     np.testing.assert_array_equal(np.concatenate([p.series.time for p in found]), whole.series.time)
     np.testing.assert_array_equal(np.concatenate([p.series.points for p in found]), whole.series.points)
     assert len({p.name for p in found}) == len(found) == max(1, round(0.01 * (frames - 1) / length))
@@ -34,7 +34,7 @@ def test_pieces_are_the_whole_recording_in_order(frames: int, length: float) -> 
 def test_a_piece_starts_in_a_frame_that_shows_every_point() -> None:
     whole = take(100)
     whole.series.points[48:55, 2] = np.nan
-    first, second = pieces(whole, 0.5)
+    first, second = cut_up(whole, 0.5)
     assert second.series.time[0] == pytest.approx(3.55)
     assert np.isfinite(second.series.points[0]).all()
     assert first.series.frames == 55
@@ -45,14 +45,14 @@ def test_a_piece_starts_in_a_frame_that_shows_every_point() -> None:
 @pytest.mark.parametrize("length", [0.05, 0.09])
 def test_pieces_that_would_be_too_short_are_refused(length: float) -> None:
     with pytest.raises(InputError, match=r"study\.window.*'swing' has pieces of fewer than 10 frames"):
-        pieces(take(100), length)
+        cut_up(take(100), length)
 
 
 def test_a_recording_that_never_shows_every_point_is_refused() -> None:
     whole = take(100)
     whole.series.points[:, 1] = np.nan
     with pytest.raises(InputError, match="start the recording where all points are seen"):
-        pieces(whole, 0.5)
+        cut_up(whole, 0.5)
 
 
 def test_only_what_starts_as_measured_is_cut() -> None:

@@ -22,12 +22,16 @@ def test_a_budget_ends_where_it_is_told_to_and_that_is_remembered() -> None:
     assert not Work.may_go_on(spent, until=645.0) and spent.cut_short  # type: ignore[arg-type]
 
 
-def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("pieces", [1.0, 4.0])
+def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pytest.MonkeyPatch, pieces: float) -> None:
     monkeypatch.setattr(work, "offsets_of", lambda study: None)
     asked = SimpleNamespace(config=SimpleNamespace(diagnose=SimpleNamespace(draws=4, simulations=1000)))
-    problem = SimpleNamespace(space=SimpleNamespace(to_unit=lambda samples: samples))
+    problem = SimpleNamespace(space=SimpleNamespace(to_unit=lambda samples: samples), pieces=pieces)
     fit = SimpleNamespace(samples=np.zeros((9, 1)), derivative_step=1e-3)
-    assert Work(asked, problem, SimpleNamespace(), fit).limit == 850  # type: ignore[arg-type]
+    spent = SimpleNamespace(count=int(400 * pieces))
+    search = Work(asked, problem, spent, fit)  # type: ignore[arg-type]
+    assert search.limit == 850 * pieces  # pieces of a recording count as one simulation ...
+    assert search.simulations == 400  # ... wherever they are told of
 
 
 def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
