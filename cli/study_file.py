@@ -13,7 +13,7 @@ from ..core.obstacles import Obstacle
 from ..core.parameters import Parameter
 from ..core.registry import REGISTRY
 from ..core.scenarios import SIZES, preset
-from ..core.scenarios.measured import MEASURED_PRIORS
+from ..core.scenarios.measured import MEASURED_PRIORS, MEASURED_STEP
 from ..core.study.config import DiagnoseTable, EstimatorTable
 
 
@@ -200,7 +200,8 @@ def _inline(tables: list[dict[str, Any]]) -> str:
 
 
 def _plugins(plan: Plan) -> str:
-    options = "".join(f"# {line}\n" for line in _options("simulator", plan.simulator))
+    own = {"time_step": MEASURED_STEP} if plan.start else {}
+    options = "".join(f"{line}\n" for line in _options("simulator", plan.simulator, own))
     default = EstimatorTable(name=plan.estimator)
     return f"""
 [simulator]
@@ -227,11 +228,12 @@ def _extractor(plan: Plan) -> str:
     return "\n".join(["[extractor]", name, *told, ""])
 
 
-def _options(kind: str, name: str) -> list[str]:
-    """``key = default`` for the options of a plugin that TOML can hold."""
+def _options(kind: str, name: str, own: dict[str, Any]) -> list[str]:
+    """``# key = default`` for the options of a plugin that TOML can hold, ``key = value`` for those of ``own``."""
     signature = inspect.signature(REGISTRY.get(kind, name))
-    defaults = [(p.name, p.default) for p in signature.parameters.values()]
-    return [f"{key} = {_value(value)}" for key, value in defaults if isinstance(value, bool | int | float | str)]
+    defaults = {p.name: p.default for p in signature.parameters.values()}
+    known = {key: value for key, value in defaults.items() if isinstance(value, bool | int | float | str)}
+    return [f"{key} = {_value(own[key])}" if key in own else f"# {key} = {_value(v)}" for key, v in known.items()]
 
 
 def _material(plan: Plan) -> str:

@@ -77,6 +77,15 @@ class Effect(ABC):
         """The material [SI] as this effect changes it, of the same class."""
         return material
 
+    def relaxed(self, material: Material) -> Material:
+        """Of ``material`` [SI], of the same class, what is left of it once friction within the object has let go.
+
+        It is with this that an object that went to and fro is in balance in the mean, and that it holds its rest
+        shape. An effect that takes bending rigidity off a rope here binds a force that lets go of the same share of
+        the bend that the rope starts with, which friction alone holds.
+        """
+        return material
+
     def on_gravity(self, gravity: FloatArray) -> FloatArray:
         """Gravity ``(3,)`` [m/s2] as this effect turns it."""
         return gravity
@@ -86,7 +95,7 @@ class Effect(ABC):
 
         Args:
             scenario: of which the body is to be replaced, moved as all effects have left the command.
-            material: [SI], as all effects have left it.
+            material: [SI], as all effects have left it, :meth:`relaxed`.
             gravity: ``(3,)`` [m/s2], as all effects have left it.
         """
         return scenario.body

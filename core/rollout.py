@@ -12,8 +12,9 @@ from .clamps import clamp_turns
 from .effect import Effect
 from .errors import InputError, RolloutFailed
 from .interpolation import interpolate
-from .material import Material
+from .material import Material, RopeMaterial
 from .motion import IDENTITY_POSE, Motion, inverse, rotate, turned
+from .rest_shape import eased
 from .sanity import SanityCheck
 from .scenario import STANDARD_GRAVITY, Scenario
 from .series import PointSeries
@@ -80,8 +81,12 @@ def rollout(
         _check_needs(effect, simulator)
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
         scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
+    relaxed = reduce(lambda left, effect: effect.relaxed(left), active, material)
     for effect in active:
-        scenario = replace(scenario, body=effect.on_body(scenario, material, gravity))
+        scenario = replace(scenario, body=effect.on_body(scenario, relaxed, gravity))
+    if isinstance(material, RopeMaterial) and isinstance(relaxed, RopeMaterial) and relaxed != material:
+        held = relaxed.bending_rigidity / material.bending_rigidity
+        scenario = replace(scenario, body=eased(scenario.body, held))
     askew = reduce(lambda turn, effect: effect.on_obstacles(turn), active, IDENTITY_POSE[3:])
     is_askew = not np.array_equal(askew, IDENTITY_POSE[3:])
     if is_askew:  # engines know level obstacles only, so all else is turned until they are

@@ -13,6 +13,7 @@ from ..kept_bend import KeptBend, kept_in
 from ..material import RopeMaterial
 from ..measurement import Recording
 from ..motion import inverse, rotate
+from ..rest_shape import rolled_out
 from ..scenario import Scenario
 from .measured import measured_start
 
@@ -57,16 +58,7 @@ def bent(scenario: Scenario, curvature: FloatArray) -> Body:
     poses = scenario.motion.at(scenario.times[:1])
     frame = _frames(start, poses)[0]
     turns = curvature * RopeBending(body, np.concatenate(scenario.grasps)).measures[:, None]
-    along = np.cross(*frame)
-    steps = [along]
-    for turn in turns:
-        axis = turn @ frame
-        angle = float(np.linalg.norm(axis))
-        if angle > 0:
-            quaternion = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis / angle])
-            frame, along = rotate(quaternion, frame), rotate(quaternion, along)
-        steps.append(along)
-    points = start[0] + np.concatenate([np.zeros((1, 3)), np.cumsum(steps * body.measures[:, None], axis=0)])
+    points = rolled_out(start[0], np.cross(*frame), frame, turns, body.measures)
     return replace(body, vertices=rotate(inverse(poses[0, 0, 3:]), points - poses[0, 0, :3]))
 
 

@@ -34,6 +34,8 @@ def check_hooks(effect: type[Effect], kind: str) -> None:
     material = sample_material(kind)
     changed: Material = one.on_material(material)
     must(type(changed) is type(material), f"on_material makes a {type(changed).__name__} of a {material.kind} material")
+    left: Material = one.relaxed(material)
+    must(type(left) is type(material), f"relaxed makes a {type(left).__name__} of a {material.kind} material")
     told = sample_scenario(kind).motion
     made = one.on_command(told, 0.005)
     must(isinstance(made, Motion), f"on_command gives a {type(made).__name__}, not a Motion")
@@ -133,7 +135,7 @@ def check_dissipative(effect: type[Effect], kind: str) -> None:
     other hook has a part in it.
     """
     one = effect(**strongest(effect))
-    for hook in ("on_body", "on_gravity", "on_obstacles", "on_command", "on_loads", "bind_grasp"):
+    for hook in ("relaxed", "on_body", "on_gravity", "on_obstacles", "on_command", "on_loads", "bind_grasp"):
         own = getattr(effect, hook) is not getattr(Effect, hook)
         must(not own, f"it is dissipative, but acts through {hook}, which can add energy")
     material = sample_material(kind)

@@ -1,5 +1,6 @@
 """Strands of a bent rope or cable that slide on each other."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.bending import RopeBending
 from ...core.effect import Effect, NodalForce
-from ...core.material import RopeMaterial
+from ...core.material import Material, RopeMaterial
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
@@ -20,12 +21,15 @@ class RopeHysteresis(Effect):
     While they stick the bending rigidity is that of the material, B. Where the curvature goes further than
     :math:`\kappa_s` from where they stick, they slide along, and a further change meets (1 - s) B only:
 
-    .. math:: M = B \kappa - s B \kappa_p, \quad |\kappa - \kappa_0 - \kappa_p| \le \kappa_s,
+    .. math::
+        M = (1 - s) B (\kappa - \kappa_0) + s B (\kappa - \kappa_1 - \kappa_p), \quad
+        |\kappa - \kappa_1 - \kappa_p| \le \kappa_s,
 
-    with the slip :math:`\kappa_p` following the change of curvature since the start, :math:`\kappa - \kappa_0`. A small
-    swing therefore meets a stiff rope, a large one a softer rope that takes the energy
+    with :math:`\kappa_0` at rest and :math:`\kappa_1` at the start, from where the slip :math:`\kappa_p` begins: a rope
+    that was handled before may have slid either way, so nothing of the bend that it starts with is
+    taken to be held by friction. A small swing meets a stiff rope, a large one a softer rope that takes the energy
     :math:`4 s B \kappa_s (K - \kappa_s)` per length from a cycle between :math:`\pm K`: the friction moment is
-    :math:`M_f = s B \kappa_s`. No strand has slid in the shape that the rope starts in.
+    :math:`M_f = s B \kappa_s`. To and fro it cancels, and (1 - s) B is what a rope is in balance with in the mean.
 
     What the sliding takes off is never more than what the engine has, so the force needs no smaller step than the rope.
 
@@ -44,6 +48,11 @@ class RopeHysteresis(Effect):
     )
     symptom: ClassVar[str] = "is as stiff in large swings as in small ones in the model where the real one gives way"
 
+    def relaxed(self, material: Material) -> Material:
+        if not isinstance(material, RopeMaterial):
+            return material
+        return replace(material, bending_rigidity=(1.0 - self.values["sliding_share"]) * material.bending_rigidity)
+
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         assert isinstance(scene.material, RopeMaterial)
         bending = RopeBending(scene.body, scene.held)
@@ -57,6 +66,6 @@ class RopeHysteresis(Effect):
             nonlocal slip
             bending.follow(state.positions)
             slip = slip + beyond(bending.curvature - before - slip, most)
-            return bending.forces(-lost * slip)
+            return bending.forces(-lost * (before + slip))
 
         return force

@@ -1,5 +1,7 @@
 """Strands that stick and slide, against the closed forms of a spring with a slider."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_objects import G, engine
@@ -7,6 +9,9 @@ from effect_objects import G, engine
 from muslin.core.bending import RopeBending
 from muslin.core.body import rope_line
 from muslin.core.material import RopeMaterial
+from muslin.core.motion import Motion
+from muslin.core.rollout import rollout
+from muslin.core.scenario import Scenario
 from muslin.core.scene import Scene
 from muslin.core.simulator import State
 from muslin.plugins.effects.strands import RopeHysteresis
@@ -64,11 +69,18 @@ def test_a_cycle_takes_four_times_the_friction_moment_times_sliding():
     assert -work[-2 * 1999 :].sum() == pytest.approx(expected, rel=2e-3)
 
 
-def test_strands_stick_in_the_shape_that_the_rope_starts_in():
+def test_friction_holds_nothing_of_the_shape_that_the_rope_starts_in():
+    """Of a start bent by kappa_1 from rest, s B kappa_1 is taken off; strands stick there."""
     force = RopeHysteresis(sliding_share=SHARE, slip_curvature=SLIP).bind(scene_of(start=bent(1.0)), np.ones(3))
-    assert moment(force, 1.0) == 0.0
-    assert moment(force, 1.0 - 0.9 * SLIP * LENGTH) == 0.0
-    assert abs(moment(force, 1.0 - 1.1 * SLIP * LENGTH)) > 0.0
+    eased = SHARE * RIGIDITY * 1.0 / LENGTH
+    assert moment(force, 1.0) == pytest.approx(eased, rel=1e-9)
+    assert moment(force, 1.0 - 0.9 * SLIP * LENGTH) == pytest.approx(eased, rel=1e-9)
+    assert moment(force, 1.0 - 1.1 * SLIP * LENGTH) < (1 - 1e-3) * eased
+
+
+def test_what_a_rope_that_slides_is_in_balance_with_is_the_softer_one():
+    left = RopeHysteresis(sliding_share=SHARE).relaxed(RopeMaterial(bending_rigidity=RIGIDITY))
+    assert left.bending_rigidity == pytest.approx((1 - SHARE) * RIGIDITY)
 
 
 def test_strands_that_slide_at_once_make_a_softer_rope():
@@ -163,3 +175,27 @@ def test_a_rod_that_was_bent_swings_out_and_stays_a_little_bent(name):
     size = np.linalg.norm(kept, axis=1)
     assert size.max() > 0.03
     assert size.max() <= 0.6 * 0.3 / (1 - 0.6) * 1.05  # where (1 - s) B kappa is s B kappa_s
+
+
+def test_a_rope_that_is_curved_at_rest_hangs_as_a_softer_one_once_its_strands_slide():
+    """Its rest shape is held by the rigidity that is left, whatever shape it starts in."""
+    angle = np.linspace(0.0, 1.5, 16)
+    curved = 0.2 * np.stack([np.sin(angle), 0 * angle, 1 - np.cos(angle)], axis=1)
+    material = RopeMaterial(0.05, stretch_stiffness=500.0, twist_rigidity=5e-3, damping_time=0.01)
+    scenario = Scenario(
+        "hook",
+        rope_line(curved, 16),
+        (np.array([0, 1]),),
+        Motion.still(),
+        np.array([0.0, 0.1]),
+        np.eye(16),
+        np.zeros(0, np.int64),
+        settle=2.0,
+    )
+
+    def hung(rigidity, *effects):
+        return rollout(engine("mujoco"), scenario, replace(material, bending_rigidity=rigidity), effects).vertices[-1]
+
+    softer, stiffer = hung(0.005), hung(0.01)
+    apart = np.abs(hung(0.01, RopeHysteresis(sliding_share=0.5)) - softer).max()
+    assert apart < 0.02 * np.abs(stiffer - softer).max()
