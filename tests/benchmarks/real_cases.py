@@ -27,8 +27,8 @@ EXAMPLES = ROOT / "examples"
 #: which starts fastest, alternately. The others are never used, and the error on them is told, too.
 CABLE_TAKES = (5, 4)
 
-#: Takes of the beam: that which is fitted, and those held out.
-BEAM_TAKES = ("gravity-b", "gravity-a", "load52-a", "load52-b", "load101-a", "load101-b")
+#: Takes of the beam: that which is fitted, with the middle one of three loads, and those held out.
+BEAM_TAKES = ("load52-a", "load52-b", "gravity-a", "gravity-b", "load101-a", "load101-b")
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def ball(name: str) -> Case:
 
 
 def beam(folder: Path, workers: int | None) -> Study:
-    """Fitted on one take without a load; its repeat and both loads are held out."""
+    """Fitted on one take; its repeat and the takes with a lighter and a heavier load are held out."""
     config = read_config(EXAMPLES / "beam/study.toml")
     config.study.fit_on, config.study.hold_out = list(BEAM_TAKES[:1]), list(BEAM_TAKES[1:])
     write_config(config, folder / "study.toml")
@@ -129,18 +129,20 @@ def cable(number: int) -> Case:
     return Case(f"cable {number}", path, make, open_loop=True, picture=True)
 
 
-def bent(case: Case, window: float | None = None) -> Case:
-    """The same with the bend that the cable keeps, whatever a diagnosis says, fitted in pieces of ``window`` [s]."""
+def given(case: Case, told: str, *effects: str, window: float | None = None) -> Case:
+    """The same with ``effects``, whatever a diagnosis says, fitted in pieces of ``window`` [s] if that is given."""
 
     def make(folder: Path, workers: int | None) -> Study:
-        study = case.make(folder, workers).add("rest-curvature")
+        study = case.make(folder, workers)
+        for effect in effects:
+            study = study.add(effect)
         config = study.config.model_copy(deep=True)
         config.study.window = window
-        config.diagnose.simulations = 800
+        config.diagnose.simulations = 300
         write_config(config, study.path)
         return Study.load(study.path, workers=workers)
 
-    return replace(case, name=f"{case.name}, bent" + (", in pieces" if window else ""), make=make)
+    return replace(case, name=f"{case.name}, {told}" + (", in pieces" if window else ""), make=make)
 
 
 def carried_cloth(folder: Path, workers: int | None) -> Study:
@@ -188,7 +190,9 @@ CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
     *(BEAM, replace(on_pybullet(BEAM), picture=True)),
     *CABLES,
-    *(bent(CABLES[0]), bent(CABLES[0], window=1.25), bent(CABLES[1])),
+    *(given(CABLES[n], "bent", "rest-curvature") for n in (0, 2)),
+    given(CABLES[0], "bent", "rest-curvature", window=1.25),
+    *(given(CABLES[n], "bent, sliding", "rest-curvature", "rope-hysteresis") for n in (0, 1)),
     *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
     *(CARRIED, IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
