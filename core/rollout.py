@@ -85,8 +85,8 @@ def rollout(
     for effect in active:
         scenario = replace(scenario, body=effect.on_body(scenario, relaxed, gravity))
     if isinstance(material, RopeMaterial) and isinstance(relaxed, RopeMaterial) and relaxed != material:
-        held = relaxed.bending_rigidity / material.bending_rigidity
-        scenario = replace(scenario, body=eased(scenario.body, held))
+        left = relaxed.bending_rigidity / material.bending_rigidity
+        scenario = replace(scenario, body=eased(scenario.body, left))
     askew = reduce(lambda turn, effect: effect.on_obstacles(turn), active, IDENTITY_POSE[3:])
     is_askew = not np.array_equal(askew, IDENTITY_POSE[3:])
     if is_askew:  # engines know level obstacles only, so all else is turned until they are
