@@ -282,7 +282,7 @@ def _rest() -> str:
     default = DiagnoseTable()
     return f"""
 [noise]
-# sd = 0.003  # of the measurement, a coordinate [m]; left out, it is estimated
+# sd = 0.003  # of a coordinate [m]; left out, it is estimated; larger, it is how near the model is meant to come
 
 [nuisance]  # prior standard deviation of what may be off in the measurement itself
 clock_offset = 0.0  # points against gripper poses [s]

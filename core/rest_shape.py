@@ -10,6 +10,9 @@ from .bending import RopeBending
 from .body import Body
 from .motion import rotate
 
+#: Turns at a vertex that are not worth telling from rounding [rad].
+_STRAIGHT = 1e-7
+
 
 def rolled_out(
     first: FloatArray, along: FloatArray, frame: FloatArray, turns: FloatArray, lengths: FloatArray
@@ -37,11 +40,11 @@ def rolled_out(
 def eased(body: Body, share: float) -> Body:
     """A rope that turns at every vertex by ``share`` of what ``body`` does, about the same direction of its material.
 
-    The first segment stays where it is.
+    The first segment stays where it is. A straight rope is given back itself.
     """
     bending = RopeBending(body)
     turns = bending.rest * bending.measures[:, None]
-    if not turns.any():
+    if np.abs(turns).max(initial=0.0) < _STRAIGHT:
         return body
     along = np.diff(body.vertices, axis=0) / body.measures[:, None]
     frames = _untwisted(along)

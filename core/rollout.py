@@ -17,6 +17,7 @@ from .motion import IDENTITY_POSE, Motion, inverse, rotate, turned
 from .rest_shape import eased
 from .sanity import SanityCheck
 from .scenario import STANDARD_GRAVITY, Scenario
+from .scenarios.starts import GivenShape
 from .series import PointSeries
 from .simulator import CAPABILITIES, Simulator
 
@@ -85,8 +86,7 @@ def rollout(
     for effect in active:
         scenario = replace(scenario, body=effect.on_body(scenario, relaxed, gravity))
     if isinstance(material, RopeMaterial) and isinstance(relaxed, RopeMaterial) and relaxed != material:
-        left = relaxed.bending_rigidity / material.bending_rigidity
-        scenario = replace(scenario, body=eased(scenario.body, left))
+        scenario = _eased(scenario, relaxed.bending_rigidity / material.bending_rigidity)
     askew = reduce(lambda turn, effect: effect.on_obstacles(turn), active, IDENTITY_POSE[3:])
     is_askew = not np.array_equal(askew, IDENTITY_POSE[3:])
     if is_askew:  # engines know level obstacles only, so all else is turned until they are
@@ -157,6 +157,16 @@ def rollout(
     for effect in active:
         points = effect.on_points(points)
     return Trajectory(PointSeries(scenario.times, points), vertices, poses, time.monotonic() - started)
+
+
+def _eased(scenario: Scenario, share: float) -> Scenario:
+    """The same with a rope of which the rest shape is bent by ``share`` of what it was; it starts as before."""
+    body = scenario.body
+    if (bent := eased(body, share)) is body:
+        return scenario
+    about = body.vertices[scenario.grasps[0]].mean(axis=0) if scenario.grasps else body.vertices.mean(axis=0)
+    start = scenario.start or GivenShape(body.vertices, float(body.measures.sum()), about)
+    return replace(scenario, body=bent, start=start)
 
 
 def _check_needs(effect: Effect, simulator: Simulator) -> None:

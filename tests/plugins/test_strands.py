@@ -193,6 +193,9 @@ def test_a_rope_that_is_curved_at_rest_hangs_as_a_softer_one_once_its_strands_sl
         settle=2.0,
     )
 
+    begun = rollout(engine("mujoco"), replace(scenario, settle=0.0), material, [RopeHysteresis(sliding_share=0.5)])
+    np.testing.assert_allclose(begun.vertices[0], curved, atol=1e-9)
+
     def hung(rigidity, *effects):
         return rollout(engine("mujoco"), scenario, replace(material, bending_rigidity=rigidity), effects).vertices[-1]
 
