@@ -23,7 +23,7 @@ MEASURED_PRIORS = (
     Parameter("twist_rigidity", "N m2", 1e-5, 0.1, "log", "torque per twist rate"),
     Parameter("damping_time", "s", 1e-4, 1.0, "log", "of internal damping, C = beta K"),
 )
-#: At longer steps [s] than this MuJoCo damps a rope that is swung by hand more than most ropes do themselves.
+#: A rope in motion is simulated at this step [s]: at longer ones MuJoCo's own damping stands in for the rope's.
 MEASURED_STEP = 0.0025
 
 #: Points between two markers at which the curve through them is measured.

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from muslin.backends.mujoco import MujocoSimulator
+from muslin.core.arrays import FloatArray
 from muslin.core.body import rope_line
+from muslin.core.effect import Effect
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
@@ -17,6 +19,7 @@ from muslin.core.scenarios import preset
 from muslin.core.scenarios.kept import told_bend
 from muslin.core.scenarios.measured import measured_start
 from muslin.plugins.effects.rest_curvature import RestCurvature
+from muslin.plugins.effects.strands import RopeHysteresis
 
 MATERIAL = RopeMaterial(linear_density=0.05, stretch_stiffness=2000.0, bending_rigidity=2e-3, twist_rigidity=2e-3)
 TIME = np.arange(0.0, 1.2, 0.01)
@@ -74,3 +77,18 @@ def test_it_is_offered_only_where_a_held_rope_was_seen_to_be_bent() -> None:
     assert why_powerless(RestCurvature, MujocoSimulator(), scenario) is None
     told = why_powerless(RestCurvature, MujocoSimulator(), replace(scenario, kept=None))
     assert told is not None and "start = 'measured'" in told
+
+
+def test_strands_that_slide_go_with_it_in_any_order_and_it_is_told_by_what_they_leave() -> None:
+    """Strands that slide at once leave half of twice the rigidity: the same rope as without them."""
+    scenario, material = model(reality(0.1)), replace(MATERIAL, damping_time=0.01)
+    stiffer = replace(material, bending_rigidity=2 * material.bending_rigidity)
+    kept, strands = RestCurvature(share=1.0), RopeHysteresis(sliding_share=0.5)
+
+    def path(material: RopeMaterial, *effects: Effect) -> FloatArray:
+        return rollout(MujocoSimulator(time_step=0.0025), scenario, material, effects).vertices
+
+    one, other = path(stiffer, kept, strands), path(stiffer, strands, kept)
+    np.testing.assert_allclose(one, other, atol=1e-9)
+    softer, stuck = path(material, kept), path(stiffer, kept)
+    assert np.abs(one - softer).max() < 0.3 * np.abs(stuck - softer).max()
