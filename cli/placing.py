@@ -8,12 +8,15 @@ import numpy as np
 
 from ..core.arrays import FloatArray
 from ..core.body import Body
+from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.registry import REGISTRY
+from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
-from .study_file import Plan, plan_table
+from .study_file import plan_table
+from .study_plan import Plan
 
 _CHOICES = ("all", "bound", "surface", "nearest")
 #: A point further than this share of the object's size from the mesh is probably in another frame.
@@ -21,6 +24,8 @@ _FAR = 0.25
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
 #: and the way from one to the next as long at most, over the shortest tree through them.
 _FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
+#: Noise below this share of how near a model is meant to come says nothing of the model.
+_FAR_BETTER = 0.1
 
 
 def parse_markers(text: str) -> str | list[int] | None:
@@ -74,13 +79,22 @@ def _measured(plan: Plan, measured: Measurement, study: Path) -> tuple[Plan, lis
     plan = replace(plan, start="measured")
     remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
     problem = build_problem(parse_config(plan_table(plan), str(study)), measured, study.parent)
+    rough = np.concatenate([fourth_differences(problem.recordings[name].series.points) for name in plan.fit_on])
+    noise = robust_sd(rough) if len(rough) else 0.0
+    if 0.0 < noise < _FAR_BETTER * MEASURED_NEAR:
+        plan = replace(plan, near=MEASURED_NEAR)
+        remarks.append(
+            f"the noise is {1e3 * noise:.2g} mm, which no model of a rope in motion comes near; the model is meant to "
+            f"come within {1e3 * MEASURED_NEAR:g} mm ([noise] sd)"
+        )
     away = standing_off([problem.recordings[name] for name in plan.fit_on])
-    if not away:
-        return plan, remarks
-    return replace(plan, markers="beside"), [
-        *remarks,
-        f"the markers stand {1e3 * away:.2g} mm beside the axis of the rope, by how their distances change as it bends",
-    ]
+    if away:
+        plan = replace(plan, markers="beside")
+        remarks.append(
+            f"the markers stand {1e3 * away:.2g} mm beside the axis of the rope, by how their distances change as it "
+            "bends"
+        )
+    return plan, remarks
 
 
 def starts_measured(plan: Plan, used: Sequence[Recording]) -> bool:

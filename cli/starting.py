@@ -21,7 +21,8 @@ from ..core.study.objects import grasps_of, object_of
 from .console import command, next_step, say
 from .output import check_output
 from .placing import doubtful_starts, parse_markers, place_markers
-from .study_file import Plan, study_text
+from .study_file import study_text
+from .study_plan import Plan
 
 Number = TypeVar("Number", int, float)
 

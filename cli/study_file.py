@@ -3,63 +3,18 @@
 import inspect
 import json
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from ..core.material import UNITS
 from ..core.obstacles import Obstacle
-from ..core.parameters import Parameter
 from ..core.registry import REGISTRY
 from ..core.scenarios import SIZES, preset
-from ..core.scenarios.measured import MEASURED_PRIORS, MEASURED_STEP
+from ..core.scenarios.measured import MEASURED_STEP
 from ..core.study.config import DiagnoseTable, EstimatorTable
-
-
-@dataclass(frozen=True)
-class Plan:
-    """What goes into a new study file.
-
-    Args:
-        measurement: path of the store, relative to the study file.
-        fit_on, hold_out: names of recordings.
-        scenario, simulator, estimator: names.
-        kind: of the object.
-        held: for every gripper the vertices that it holds.
-        size: of the object [m]; empty for a mesh.
-        vertices: counts along the same axes; of a mesh empty, but for a rope.
-        mesh: file with the object, relative to the study file, or None for a built-in one.
-        mesh_scale: of its coordinates.
-        grasp_points: where each gripper holds it, None for where the scenario says.
-        points: measured points to compare, None for all.
-        markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
-        extractor: name and options of what found the points in pictures, or None where they were measured.
-        start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
-    """
-
-    measurement: str
-    fit_on: list[str]
-    hold_out: list[str]
-    scenario: str
-    simulator: str
-    estimator: str
-    kind: str
-    held: list[list[int]]
-    size: list[float]
-    vertices: list[int]
-    mesh: str | None
-    mesh_scale: float
-    grasp_points: list[list[float]] | None
-    points: list[int] | None
-    markers: str | list[int] | None
-    extractor: dict[str, Any] | None = None
-    start: str | None = None
-
-    @property
-    def priors(self) -> tuple[Parameter, ...]:
-        """What is inferred."""
-        return MEASURED_PRIORS if self.start else preset(self.scenario).default_priors(self.kind)
+from .study_plan import Plan
 
 
 def plan_table(plan: Plan) -> dict[str, Any]:
@@ -78,7 +33,7 @@ def study_text(plan: Plan) -> str:
         _material(plan),
         _parameters(plan),
         _effects(plan.kind),
-        _rest(),
+        _rest(plan),
     ]
     return "\n".join(parts)
 
@@ -278,11 +233,11 @@ def _effects(kind: str) -> str:
 """
 
 
-def _rest() -> str:
+def _rest(plan: Plan) -> str:
     default = DiagnoseTable()
     return f"""
 [noise]
-# sd = 0.003  # of a coordinate [m]; left out, it is estimated; larger, it is how near the model is meant to come
+{_noise(plan)}
 
 [nuisance]  # prior standard deviation of what may be off in the measurement itself
 clock_offset = 0.0  # points against gripper poses [s]
@@ -293,6 +248,17 @@ constant_offset = 0.0  # of the frame of the points [m]
 # candidates = {_value(REGISTRY.names("effect"))}
 draws = {default.draws}  # starting points that are tried for each effect
 """
+
+
+def _noise(plan: Plan) -> str:
+    if plan.near is None:
+        return (
+            "# sd = 0.003  # of a coordinate [m]; left out, it is estimated; larger, it is how near the model is meant "
+            "to come"
+        )
+    return f"""# The measurement is far better than any model of a rope in motion. So this is not its noise (which is
+# estimated where it is left out), but how near the model is meant to come; what is beyond counts as a misfit.
+sd = {_value(plan.near)}  # of a coordinate [m]"""
 
 
 def _value(value: Any) -> str:

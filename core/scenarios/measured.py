@@ -25,6 +25,9 @@ MEASURED_PRIORS = (
 )
 #: A rope in motion is simulated at this step [s]: at longer ones MuJoCo's own damping stands in for the rope's.
 MEASURED_STEP = 0.0025
+#: How near the model of a rope in motion is meant to come [m], where it is seen better than that. Marker offsets, the
+#: bend that a cable keeps and its grip are known no better, and what every draw is off by tells draws apart no more.
+MEASURED_NEAR = 0.005
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200

@@ -11,7 +11,7 @@ from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.motion import Motion
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import MEASURED_STEP
+from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP
 from muslin.core.series import PointSeries
 from muslin.core.study import build_problem, read_config
 
@@ -93,6 +93,20 @@ def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: py
     config = read_config(path)
     assert config.scenario.markers == "beside" and config.scenario.start == "measured"
     build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path)
+
+
+@pytest.mark.parametrize("noise, near", [(3e-5, MEASURED_NEAR), (1e-3, None)])
+def test_a_rope_that_is_seen_far_better_than_it_is_modelled_is_held_to_less(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, near: float | None
+) -> None:
+    points, motion = from_end_to_end(9)
+    seen = points + np.random.default_rng(0).normal(0.0, noise, (60, *points.shape))
+    take = Recording("one", PointSeries(np.linspace(0, 0.6, 60), seen), motion)
+    save_measurement(Measurement((take, replace(take, name="two"))), tmp_path / "m.zarr")
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
+    assert read_config(path).noise.sd == near
+    assert ("come within 5 mm ([noise] sd)" in capsys.readouterr().out) == (near is not None)
 
 
 @pytest.mark.parametrize("fault", ["hidden", "out of order", "far from the grippers", "few"])

@@ -1,0 +1,55 @@
+"""What goes into a new study file."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..core.parameters import Parameter
+from ..core.scenarios import preset
+from ..core.scenarios.measured import MEASURED_PRIORS
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What goes into a new study file.
+
+    Args:
+        measurement: path of the store, relative to the study file.
+        fit_on, hold_out: names of recordings.
+        scenario, simulator, estimator: names.
+        kind: of the object.
+        held: for every gripper the vertices that it holds.
+        size: of the object [m]; empty for a mesh.
+        vertices: counts along the same axes; of a mesh empty, but for a rope.
+        mesh: file with the object, relative to the study file, or None for a built-in one.
+        mesh_scale: of its coordinates.
+        grasp_points: where each gripper holds it, None for where the scenario says.
+        points: measured points to compare, None for all.
+        markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
+        extractor: name and options of what found the points in pictures, or None where they were measured.
+        start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
+        near: how near the model is meant to come [m], None for as near as the noise lets it.
+    """
+
+    measurement: str
+    fit_on: list[str]
+    hold_out: list[str]
+    scenario: str
+    simulator: str
+    estimator: str
+    kind: str
+    held: list[list[int]]
+    size: list[float]
+    vertices: list[int]
+    mesh: str | None
+    mesh_scale: float
+    grasp_points: list[list[float]] | None
+    points: list[int] | None
+    markers: str | list[int] | None
+    extractor: dict[str, Any] | None = None
+    start: str | None = None
+    near: float | None = None
+
+    @property
+    def priors(self) -> tuple[Parameter, ...]:
+        """What is inferred."""
+        return MEASURED_PRIORS if self.start else preset(self.scenario).default_priors(self.kind)
