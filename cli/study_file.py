@@ -39,12 +39,15 @@ def study_text(plan: Plan) -> str:
 
 
 def _study(plan: Plan) -> str:
+    pieces = ""
+    if plan.window is not None:
+        pieces = f"window = {plan.window}  # fitted in pieces of about so many seconds that start as measured [s]\n"
     return f"""
 [study]
 measurement = {_value(plan.measurement)}  # relative to this file
 fit_on = {_value(plan.fit_on)}  # recordings that the fit sees
 hold_out = {_value(plan.hold_out)}  # recordings kept back, to check every claim on
-seed = 0  # same seed, same machine: same result
+{pieces}seed = 0  # same seed, same machine: same result
 # time_limit = 120.0  # a simulation that takes longer has failed [s]
 """
 
@@ -247,6 +250,7 @@ constant_offset = 0.0  # of the frame of the points [m]
 # Which effects to try; left out, every one that fits the object.
 # candidates = {_value(REGISTRY.names("effect"))}
 draws = {default.draws}  # starting points that are tried for each effect
+# simulations = 2000  # in all, at most; left out, what suits the object and the number of recordings
 """
 
 

@@ -83,12 +83,13 @@ class NuisanceTable(StrictTable):
 class DiagnoseTable(StrictTable):
     """``[diagnose]``: which effects to try, from how many points each at most, with how many simulations in all.
 
-    Those of all pieces that a recording is cut into (``[study] window``) count as one.
+    Those of all pieces that a recording is cut into (``[study] window``) count as one. None: as many as suit the object
+    and the number of recordings that are fitted.
     """
 
     candidates: list[str] | None = None
     draws: int = Field(default=16, ge=4)
-    simulations: int = Field(default=1000, ge=100)
+    simulations: int | None = Field(default=None, ge=100)
 
 
 class StudyConfig(StrictTable):

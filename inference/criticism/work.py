@@ -21,8 +21,17 @@ from .verdict import Evidence
 
 #: Share of the simulations that the search leaves: for what it has begun when they end, and for telling what it found.
 RESERVED = 0.15
+#: Simulations of a diagnosis for every recording that is fitted, and at least; ropes take a tenth of the time of cloth.
+A_RECORDING, A_RECORDING_OF_A_ROPE, AT_LEAST = 500, 1000, 1000
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
+
+
+def usual_simulations(problem: Problem) -> int:
+    """How many simulations a diagnosis may take where the study does not say."""
+    name = problem.fit_on[0]
+    each = A_RECORDING_OF_A_ROPE if problem.scenarios[name].body.kind == "rope" else A_RECORDING
+    return max(AT_LEAST, round(each * len(problem.fit_on) / problem.pieces))
 
 
 class Work:
@@ -43,7 +52,8 @@ class Work:
         self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-        self.limit = int((1 - RESERVED) * study.config.diagnose.simulations * problem.pieces)
+        asked = study.config.diagnose.simulations or usual_simulations(problem)
+        self.limit = int((1 - RESERVED) * asked * problem.pieces)
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})

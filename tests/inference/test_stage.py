@@ -12,7 +12,7 @@ from muslin.inference.criticism.diagnose import _rest
 from muslin.inference.criticism.linear import Look
 from muslin.inference.criticism.stage import _Tournament
 from muslin.inference.criticism.verdict import Decision
-from muslin.inference.criticism.work import Work
+from muslin.inference.criticism.work import Work, usual_simulations
 from muslin.inference.polish import Polished
 
 
@@ -20,6 +20,19 @@ def test_a_budget_ends_where_it_is_told_to_and_that_is_remembered() -> None:
     spent = SimpleNamespace(count=650, limit=850, cut_short=False)
     assert Work.may_go_on(spent) and not spent.cut_short  # type: ignore[arg-type]
     assert not Work.may_go_on(spent, until=645.0) and spent.cut_short  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "kind, takes, pieces, usual",
+    [("cloth", 1, 1, 1000), ("cloth", 4, 1, 2000), ("rope", 2, 1, 2000), ("rope", 2, 4, 2000)],
+)
+def test_more_recordings_and_objects_that_are_quick_to_simulate_get_more_simulations(
+    kind: str, takes: int, pieces: int, usual: int
+) -> None:
+    scenario = SimpleNamespace(body=SimpleNamespace(kind=kind))
+    names = [str(k) for k in range(takes * pieces)]
+    problem = SimpleNamespace(fit_on=names, scenarios=dict.fromkeys(names, scenario), pieces=float(pieces))
+    assert usual_simulations(problem) == usual  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("pieces", [1.0, 4.0])
