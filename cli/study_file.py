@@ -158,7 +158,9 @@ def _inline(tables: list[dict[str, Any]]) -> str:
 
 
 def _plugins(plan: Plan) -> str:
-    own = {"time_step": MEASURED_STEP} if plan.start else {}
+    own = {}
+    if usual := REGISTRY.get("simulator", plan.simulator).usual_steps.get(plan.kind):
+        own = {"time_step": max(usual, MEASURED_STEP) if plan.start else usual}
     options = "".join(f"{line}\n" for line in _options("simulator", plan.simulator, own))
     default = EstimatorTable(name=plan.estimator)
     return f"""

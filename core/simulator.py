@@ -1,7 +1,8 @@
 """Simulators: what a backend owes."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -105,6 +106,8 @@ class Simulator(ABC):
     object_kinds: ClassVar[frozenset[str]]
     #: Which of :data:`CAPABILITIES` it has.
     capabilities: ClassVar[frozenset[str]] = frozenset()
+    #: ``time_step`` that a new study of an object of a kind gets, where what it is by default is too long [s].
+    usual_steps: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     @abstractmethod
     def open(self, scene: Scene) -> World:

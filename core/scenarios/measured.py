@@ -23,7 +23,8 @@ MEASURED_PRIORS = (
     Parameter("twist_rigidity", "N m2", 1e-5, 0.1, "log", "torque per twist rate"),
     Parameter("damping_time", "s", 1e-4, 1.0, "log", "of internal damping, C = beta K"),
 )
-#: A rope in motion is simulated at this step [s]: at longer ones MuJoCo's own damping stands in for the rope's.
+#: Takes of a rope in motion are long, so steps need not be shorter than this [s]: recorded cables came out the same to
+#: .1 mm. Longer ones do not do: MuJoCo's own damping then stands in for the rope's.
 MEASURED_STEP = 0.0025
 #: It is fitted in pieces of about this length [s], if takes are twice as long: later on, small errors have grown until
 #: what it does is left to chance.

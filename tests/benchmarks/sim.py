@@ -23,9 +23,10 @@ from unittest.mock import patch
 import numpy as np
 from table import Row, report
 
+from muslin.core.arrays import FloatArray
 from muslin.core.comparison.compare_simulators import latin_hypercube
 from muslin.core.effect import Effect
-from muslin.core.material import DEFAULT_PRIORS, ClothMaterial
+from muslin.core.material import DEFAULT_PRIORS, ClothMaterial, Material
 from muslin.core.obstacles import Table
 from muslin.core.parameters import ParameterSpace
 from muslin.core.registry import REGISTRY
@@ -37,6 +38,7 @@ from muslin.core.study import Problem, SimulationPool, Task
 MATERIAL = ClothMaterial()
 GRAVITY = np.array([0.0, 0.0, -9.80665])
 SEED = 1
+STEPS = (0.0005, 0.00125, 0.0025, 0.005)
 
 
 def timed(call: Callable[[], object]) -> float:
@@ -236,19 +238,28 @@ def rendering(rows: list[Row]) -> None:
 
 
 def time_steps(rows: list[Row]) -> None:
-    for name in ("fling", "swing"):
-        scenario = preset(name).scenario()
-        paths = {}
-        for step in (0.0005, 0.0025, 0.005):
-            made = rollout(REGISTRY.get("simulator", "mujoco")(time_step=step), scenario, MATERIAL)
-            paths[step] = made.vertices
-            if step > 0.0005:
-                apart = 1e3 * float(np.sqrt(np.mean(np.sum((made.vertices - paths[0.0005]) ** 2, axis=-1))))
-                rows.append(Row(f"(f) {name}, MuJoCo at {1e3 * step:g} ms from 0.5 ms", round(apart, 1), "mm RMS"))
-        other = rollout(REGISTRY.get("simulator", "pybullet")(), scenario, MATERIAL).vertices
+    rope = preset("swing").scenario(size=(0.6,), vertices=(16,))
+    cases: list[tuple[str, Scenario, Material]] = [
+        (name, preset(name).scenario(), MATERIAL) for name in ("fling", "swing")
+    ]
+    cases.append(("swing of a rope", rope, preset("swing").default_material("rope")))
+    smallest, *others = STEPS
+    for name, scenario, material in cases:
+        paths = {
+            step: rollout(REGISTRY.get("simulator", "mujoco")(time_step=step), scenario, material).vertices
+            for step in STEPS
+        }
+        for step in others:
+            away = apart(paths[step], paths[smallest])
+            rows.append(Row(f"(f) {name}, MuJoCo at {1e3 * step:g} ms from {1e3 * smallest:g} ms", away, "mm RMS"))
+        other = rollout(REGISTRY.get("simulator", "pybullet")(), scenario, material).vertices
         for step, path in paths.items():
-            apart = 1e3 * float(np.sqrt(np.mean(np.sum((other - path) ** 2, axis=-1))))
-            rows.append(Row(f"(f) {name}, PyBullet from MuJoCo at {1e3 * step:g} ms", round(apart, 1), "mm RMS"))
+            rows.append(Row(f"(f) {name}, PyBullet from MuJoCo at {1e3 * step:g} ms", apart(other, path), "mm RMS"))
+
+
+def apart(one: FloatArray, other: FloatArray) -> float:
+    """Root mean square distance of vertices ``(T, V, 3)`` [mm]."""
+    return round(1e3 * float(np.sqrt(np.mean(np.sum((one - other) ** 2, axis=-1)))), 1)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from muslin.cli.main import run
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.motion import Motion
+from muslin.core.registry import REGISTRY
 from muslin.core.scenarios import preset
 from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP, MEASURED_WINDOW
 from muslin.core.series import PointSeries
@@ -68,7 +69,9 @@ def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
     first = problem.simulate(middle, "one").series.points[0]
     assert np.abs(first - problem.recordings["one"].series.points[0]).max() < 0.002
     assert status("new", path, "--measurement", measurement, "--scenario", "cable", "--size", "0.8", "--force") == 0
-    assert read_config(path).scenario.start is None
+    config = read_config(path)
+    assert config.scenario.start is None
+    assert config.simulator.options["time_step"] == REGISTRY.get("simulator", "mujoco").usual_steps["rope"]
 
 
 def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

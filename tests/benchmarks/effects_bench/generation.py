@@ -23,7 +23,7 @@ from muslin.core.study.problem import Problem, build_problem
 
 from .cases import CORRELATION, DROPOUT, Case
 from .outside import LAWS, effect_class
-from .settings import FINE_STEP, SETTINGS, TIME_STEP, frames
+from .settings import SETTINGS, TIME_STEPS, frames
 from .strength import RANGES, Calibrator, Scaled, direction, scaled, solve
 
 #: A look-alike is one that leaves at most this, in units of -2 log likelihood, of a misfit of at least that.
@@ -96,7 +96,7 @@ def study_config(case: Case) -> StudyConfig:
     content: dict[str, Any] = {
         "study": {"measurement": "recording.zarr", "fit_on": list(fit_on), "hold_out": hold_out, "seed": case.seed},
         "scenario": table.model_dump(exclude_defaults=True, exclude_none=True),
-        "simulator": {"name": "mujoco", "time_step": TIME_STEP},
+        "simulator": {"name": "mujoco", "time_step": TIME_STEPS[setting.thing]},
         "estimator": {"name": "bayessim-rkhs", "rounds": 2, "draws": 64},
         "parameters": {k: p.model_dump(exclude_none=True) for k, p in setting.parameters.items()},
     }
@@ -226,11 +226,11 @@ def _look_alike(
 
 
 def _reality(case: Case) -> Simulator:
-    options = {"time_step": FINE_STEP} if case.source == "finer" else {"time_step": TIME_STEP}
+    step = TIME_STEPS[SETTINGS[case.setting].thing]
     if case.source == "other":
         made: Simulator = REGISTRY.get("simulator", "pybullet")()
         return made
-    made = REGISTRY.get("simulator", "mujoco")(**options)
+    made = REGISTRY.get("simulator", "mujoco")(time_step=step / 2 if case.source == "finer" else step)
     return made
 
 
