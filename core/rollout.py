@@ -92,7 +92,9 @@ def rollout(
     if is_askew:  # engines know level obstacles only, so all else is turned until they are
         level = inverse(askew)
         gravity = rotate(level, gravity)
-        scenario = replace(scenario, motion=Motion(scenario.motion.times, turned(level, scenario.motion.poses)))
+        earlier = None if scenario.earlier is None else rotate(level, scenario.earlier)
+        motion = Motion(scenario.motion.times, turned(level, scenario.motion.poses))
+        scenario = replace(scenario, motion=motion, earlier=earlier)
     scene = scenario.scene(material, gravity, scale)
     for effect in active:
         scene = replace(scene, loads=effect.on_loads(scene.body, material, scene.loads))

@@ -71,6 +71,8 @@ class Scenario:
         sampled: the markers are places spread over the object, not spots that are marked on it.
         beside: how far the markers of a rope between two grippers stand beside its axis; None: they sit on it.
         kept: the bend that a rope that starts as it was measured keeps where nothing acts on it; None: not known.
+        earlier: where the vertices of a rope were seen before it starts, one after the other ``(H, V, 3)`` [m], where
+            what is simulated is a piece of a longer recording; None: what was before is not known.
     """
 
     name: str
@@ -90,6 +92,7 @@ class Scenario:
     sampled: bool = False
     beside: Beside | None = None
     kept: KeptBend | None = None
+    earlier: FloatArray | None = None
 
     def __post_init__(self) -> None:
         count = len(self.body.vertices)
@@ -162,8 +165,10 @@ class Scenario:
             loads[self.load_vertices] = self.load / len(self.load_vertices)
         clearance = material.diameter / 2 if isinstance(material, RopeMaterial) else 0.0
         start = None if self.start is None else self.start_vertices(scale, clearance)
-        motion = (None, None) if self.start_motion is None else self.start_motion.along(len(body.vertices))
-        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start, *motion)
+        still = (None, None)
+        speeds, gains = still if self.start_motion is None else self.start_motion.along(len(body.vertices))
+        earlier = None if self.earlier is None else scale * _on_mesh(self.earlier, len(body.vertices))
+        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start, speeds, gains, earlier)
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
         """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].
@@ -197,6 +202,14 @@ def _equal(a: object, b: object) -> bool:
     if is_dataclass(a):
         return all(_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
     return bool(a == b)
+
+
+def _on_mesh(shapes: FloatArray, count: int) -> FloatArray:
+    """Shapes of a rope ``(H, V, 3)``, on a mesh of ``count`` vertices."""
+    own, wanted = np.arange(shapes.shape[1]), np.linspace(0, shapes.shape[1] - 1, count)
+    left = np.minimum(wanted.astype(np.int64), len(own) - 2)
+    share = (wanted - left)[:, None]
+    return np.asarray((1 - share) * shapes[:, left] + share * shapes[:, left + 1])
 
 
 def marker_weights(count: int, ids: IntArray) -> FloatArray:

@@ -27,6 +27,8 @@ class Scene:
         start_velocities: at time zero ``(V, 3)`` [m/s], of those that are not held; None: at rest.
         start_accelerations: ``(V, 3)`` [m/s2] that were measured then, which whatever the object's forces are must
             give; None: not known. Engines do not need them.
+        earlier: shapes that a rope was in before, one after the other ``(H, V, 3)`` [m], wherever they were; None: not
+            known. Engines do not need them; effects with a memory do.
     """
 
     body: Body
@@ -38,6 +40,7 @@ class Scene:
     start: FloatArray | None = None
     start_velocities: FloatArray | None = None
     start_accelerations: FloatArray | None = None
+    earlier: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for what in ("start", "start_velocities", "start_accelerations"):

@@ -37,6 +37,8 @@ MEASURED_NEAR = 0.005
 _FINE = 200
 #: Parabolas through the first frames go through so many at least, and through none later than this [s].
 _FEWEST, _LONGEST = 5, 0.3
+#: Shapes before the start are so far apart [s].
+_EARLIER = 0.03
 #: They fit where they leave no more than this times the noise.
 _WITHIN = 1.5
 
@@ -84,6 +86,28 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
     start = GivenShape(local, along[-1], np.zeros(3))
     motion = first_motion(series, places)
     return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion, beside=beside)
+
+
+def with_earlier(scenario: Scenario, recording: Recording) -> Scenario:
+    """The scenario of a piece of a ``recording`` that starts as measured, with the shapes that the rope was in before.
+
+    Of the frames that show every marker, so many a second that it bends little from one to the next.
+    """
+    series = recording.series
+    step = float(np.median(np.diff(series.time)))
+    seen = np.isfinite(series.points).all(axis=(1, 2)) & (series.time < scenario.times[0])
+    frames = np.flatnonzero(seen)[:: max(1, round(_EARLIER / step))]
+    if not len(frames):
+        return scenario
+    points, count = series.points[frames], len(scenario.body.vertices)
+    if scenario.beside is not None:
+        points = scenario.beside.axis(points, scenario.motion.at(series.time[frames]))
+    out = np.empty((len(points), count, 3))
+    for k, curve in enumerate(curves(points)[0]):
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
+        evenly = np.linspace(0.0, along[-1], count)
+        out[k] = np.stack([np.interp(evenly, along, x) for x in curve.T], axis=1)
+    return replace(scenario, earlier=out)
 
 
 def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:

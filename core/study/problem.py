@@ -23,6 +23,7 @@ from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
 from ..scenarios.kept import told_bend
+from ..scenarios.measured import with_earlier
 from ..scenarios.standoffs import told_standoffs
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
@@ -134,9 +135,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if not fit_on:
         raise InputError("[study.fit_on]: nothing is left to fit on, every recording is held out")
     held, fitted = [measurement[n] for n in hold_out], [measurement[n] for n in fit_on]
-    cuts = 1.0
+    cuts, whole = 1.0, dict[str, Recording]()
     if (length := config.study.window) is not None:
-        fitted = [piece for r in fitted for piece in cut_up(r, length)]
+        pieces = [(piece, r) for r in fitted for piece in cut_up(r, length)]
+        fitted, whole = [piece for piece, _ in pieces], {piece.name: r for piece, r in pieces}
         cuts, fit_on = len(fitted) / len(fit_on), tuple(r.name for r in fitted)
     used = {r.name: r for r in (*fitted, *held)}
     base = preset(config.scenario.name)
@@ -158,6 +160,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if config.scenario.start == "measured":
         kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])
         scenarios = {n: replace(s, kept=kept) for n, s in scenarios.items()}
+        scenarios |= {n: with_earlier(scenarios[n], _keep_points(r, config.scenario.points)) for n, r in whole.items()}
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
     for name in config.diagnose.candidates or []:

@@ -25,9 +25,10 @@ class RopeHysteresis(Effect):
         M = (1 - s) B (\kappa - \kappa_0) + s B (\kappa - \kappa_1 - \kappa_p), \quad
         |\kappa - \kappa_1 - \kappa_p| \le \kappa_s,
 
-    with :math:`\kappa_0` at rest and :math:`\kappa_1` at the start, from where the slip :math:`\kappa_p` begins: a rope
-    that was handled before may have slid either way, so nothing of the bend that it starts with is
-    taken to be held by friction. A small swing meets a stiff rope, a large one a softer rope that takes the energy
+    with :math:`\kappa_0` at rest and :math:`\kappa_1` where the rope was seen first, from where the slip
+    :math:`\kappa_p` begins: a rope that was handled before may have slid either way, so nothing of the bend that it
+    has there is taken to be held by friction. How it was bent from there to the start of a piece of a recording tells
+    how it slid till then. A small swing meets a stiff rope, a large one a softer rope that takes the energy
     :math:`4 s B \kappa_s (K - \kappa_s)` per length from a cycle between :math:`\pm K`: the friction moment is
     :math:`M_f = s B \kappa_s`. To and fro it cancels, and (1 - s) B is what a rope is in balance with in the mean.
 
@@ -56,11 +57,16 @@ class RopeHysteresis(Effect):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         assert isinstance(scene.material, RopeMaterial)
         bending = RopeBending(scene.body, scene.held)
-        bending.follow(scene.start_positions)
         lost = self.values["sliding_share"] * scene.material.bending_rigidity
         most = self.values["slip_curvature"]
+        earlier = [] if scene.earlier is None else list(scene.earlier)
+        first, *later = [*earlier, scene.start_positions]
+        bending.follow(first)
         before = bending.curvature
         slip = np.zeros_like(before)
+        for shape in later:
+            bending.follow(shape)
+            slip = slip + beyond(bending.curvature - before - slip, most)
 
         def force(time: float, state: State) -> FloatArray:
             nonlocal slip

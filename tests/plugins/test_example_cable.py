@@ -2,13 +2,16 @@
 
 import shutil
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from published import ROOT, published
 
+from muslin.core.body import rope_line
 from muslin.core.dataset import DatasetNote
+from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.motion import Motion
@@ -52,17 +55,17 @@ def test_every_take_starts_where_it_was_measured(tmp_path: Path) -> None:
         start = scenario.markers @ scenario.start_vertices()
         assert np.linalg.norm(start - recording.series.points[0], axis=1).max() < 0.002
         assert scenario.body.measures.sum() == pytest.approx(1.04, rel=0.005)
-    moved = study.problem.simulate({"bending_rigidity": 1e-3, "twist_rigidity": 1e-3, "damping_time": 0.02}, "97")
-    first = moved.series.points[0] - study.problem.recordings["97"].series.points[0]
+    moved = study.problem.simulate({"bending_rigidity": 1e-3, "twist_rigidity": 1e-3, "damping_time": 0.02}, "87")
+    first = moved.series.points[0] - study.problem.recordings["87"].series.points[0]
     assert np.linalg.norm(first, axis=1).max() < 0.002  # as measured, nothing has relaxed yet
-    ends = moved.series.points[:, [0, -1]] - study.problem.recordings["97"].series.points[:, [0, -1]]
+    ends = moved.series.points[:, [0, -1]] - study.problem.recordings["87"].series.points[:, [0, -1]]
     assert np.abs(ends).max() < 0.002  # held where the grippers are
 
 
 def test_takes_that_are_fitted_can_be_cut_and_held_out_ones_stay_whole(tmp_path: Path) -> None:
     measured(tmp_path, [bent(k) for k in range(len(NAMES))])
     path = tmp_path / "study.toml"
-    path.write_text(path.read_text().replace("[study]", "[study]\nwindow = 0.25"))
+    path.write_text(path.read_text().replace("window = 1.25 ", "window = 0.25 "))
     problem = Study.load(path, workers=0).problem
     assert problem.fit_on[:2] == ("97 from 0 s", "97 from 0.25 s")
     assert len(problem.fit_on) == 2 * len(FITTED) and problem.hold_out == NAMES[5:]
@@ -74,13 +77,38 @@ def test_takes_that_are_fitted_can_be_cut_and_held_out_ones_stay_whole(tmp_path:
         assert np.linalg.norm(made.points[0] - recording.points[0], axis=1).max() < 0.002
 
 
+def test_a_piece_knows_how_the_rope_was_bent_before(tmp_path: Path) -> None:
+    measured(tmp_path, [bent(k) for k in range(len(NAMES))])
+    path = tmp_path / "study.toml"
+    path.write_text(path.read_text().replace("window = 1.25 ", "window = 0.25 "))
+    problem = Study.load(path, workers=0).problem
+    scenarios = problem.scenarios
+    assert scenarios["97 from 0 s"].earlier is None and scenarios["87"].earlier is None
+    piece = scenarios["97 from 0.25 s"]
+    whole = problem.recordings["97 from 0 s"].series
+    assert piece.earlier is not None and len(piece.earlier) == len(whole.time[::3])
+    seen = whole.points[::3]
+    np.testing.assert_allclose(piece.earlier[:, 0], seen[:, 0], atol=0.0005)
+    assert np.linalg.norm(np.einsum("mv,tvx->tmx", piece.markers, piece.earlier) - seen, axis=2).max() < 0.002
+    coarse = replace(
+        piece,
+        body=rope_line(np.array([[0.0, 0.0, 0.0], [1.04, 0.0, 0.0]]), 21),
+        grasps=(np.array([0, 1]), np.array([19, 20])),
+        markers=np.eye(21),
+        load_vertices=np.zeros(0, np.int64),
+    )
+    scene = coarse.scene(RopeMaterial(bending_rigidity=1e-3), np.zeros(3))
+    np.testing.assert_allclose(scene.earlier, piece.earlier[:, ::2])
+
+
 def test_the_real_takes_of_the_example_are_there_and_can_be_simulated(tmp_path: Path) -> None:
     path = published("cable/cable1.npz")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DatasetNote)
         takes = REGISTRY.get("dataset", "deform-cable")(path, list(NAMES))
     study = measured(tmp_path, takes)
-    assert study.problem.fit_on == FITTED and (*FITTED, *study.problem.hold_out) == NAMES
+    pieces = [name.split(" from ")[0] for name in study.problem.fit_on]
+    assert sorted(pieces) == sorted(4 * FITTED) and (*FITTED, *study.problem.hold_out) == NAMES
     made = study.problem.simulate(
         {"bending_rigidity": 1e-3, "twist_rigidity": 1e-3, "damping_time": 0.02}, "87"
     ).series.points

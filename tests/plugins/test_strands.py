@@ -46,6 +46,19 @@ def strands(share=SHARE, slip=SLIP):
     return RopeHysteresis(sliding_share=share, slip_curvature=slip).bind(scene_of(), np.ones(3))
 
 
+def test_strands_know_how_they_slid_before_the_start():
+    """A piece of a recording is met as the whole would be."""
+    whole, path = strands(), np.concatenate([np.linspace(0, 40, 9), np.linspace(40, 25, 4)[1:]])
+    for k in path:
+        expected = moment(whole, k * LENGTH)
+    *earlier, start = [bent(k * LENGTH) for k in path]
+    scene = scene_of(earlier=np.array(earlier), start=start)
+    piece = RopeHysteresis(sliding_share=SHARE, slip_curvature=SLIP).bind(scene, np.ones(3))
+    assert moment(piece, path[-1] * LENGTH) == pytest.approx(expected, rel=1e-9)
+    for k in (10.0, -20.0, 5.0):
+        assert moment(piece, k * LENGTH) == pytest.approx(moment(whole, k * LENGTH), rel=1e-9)
+
+
 def test_a_bend_is_met_by_all_of_the_rigidity_and_then_by_what_does_not_slide():
     """Beside the material's: nothing up to kappa_s, s B less beyond, nothing for 2 kappa_s on the way back."""
     force, curvatures = strands(), np.concatenate([np.linspace(0, 40, 81), np.linspace(40, -40, 161)[1:]])
