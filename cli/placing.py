@@ -12,7 +12,7 @@ from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.registry import REGISTRY
-from ..core.scenarios.measured import MEASURED_NEAR, MEASURED_WINDOW
+from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
 from .study_file import plan_table
@@ -79,10 +79,6 @@ def _measured(plan: Plan, measured: Measurement, study: Path) -> tuple[Plan, lis
     plan = replace(plan, start="measured")
     remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
     problem = build_problem(parse_config(plan_table(plan), str(study)), measured, study.parent)
-    lasts = min(np.ptp(problem.recordings[name].series.time) for name in plan.fit_on)
-    if lasts >= 2 * MEASURED_WINDOW:
-        plan = replace(plan, window=MEASURED_WINDOW)
-        remarks.append(f"it is fitted in pieces of about {MEASURED_WINDOW:g} s that start as measured ([study] window)")
     rough = np.concatenate([fourth_differences(problem.recordings[name].series.points) for name in plan.fit_on])
     noise = robust_sd(rough) if len(rough) else 0.0
     if 0.0 < noise < _FAR_BETTER * MEASURED_NEAR:

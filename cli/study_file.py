@@ -40,8 +40,10 @@ def study_text(plan: Plan) -> str:
 
 def _study(plan: Plan) -> str:
     pieces = ""
-    if plan.window is not None:
-        pieces = f"window = {plan.window}  # fitted in pieces of about so many seconds that start as measured [s]\n"
+    if plan.start:
+        pieces = (
+            "# window = 1.25  # in pieces of so many seconds that start as measured, if a fit finds the whole chaotic\n"
+        )
     return f"""
 [study]
 measurement = {_value(plan.measurement)}  # relative to this file

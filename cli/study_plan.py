@@ -27,7 +27,6 @@ class Plan:
         markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
         extractor: name and options of what found the points in pictures, or None where they were measured.
         start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
-        window: length of the pieces that recordings are fitted in [s], None for whole ones.
         near: how near the model is meant to come [m], None for as near as the noise lets it.
     """
 
@@ -48,7 +47,6 @@ class Plan:
     markers: str | list[int] | None
     extractor: dict[str, Any] | None = None
     start: str | None = None
-    window: float | None = None
     near: float | None = None
 
     @property

@@ -26,9 +26,6 @@ MEASURED_PRIORS = (
 #: Takes of a rope in motion are long, so steps need not be shorter than this [s]: recorded cables came out the same to
 #: .1 mm. Longer ones do not do: MuJoCo's own damping then stands in for the rope's.
 MEASURED_STEP = 0.0025
-#: It is fitted in pieces of about this length [s], if takes are twice as long: later on, small errors have grown until
-#: what it does is left to chance.
-MEASURED_WINDOW = 1.25
 #: How near the model of a rope in motion is meant to come [m], where it is seen better than that. Marker offsets, the
 #: bend that a cable keeps and its grip are known no better, and what every draw is off by tells draws apart no more.
 MEASURED_NEAR = 0.005

@@ -41,6 +41,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             + "; ".join(loose)
             + "; what it does there is chance and does not count. Where chance does not decide in reality, "
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
+            + ("; fitted in pieces, it does not come so far: [study] window = 1.25" if _could_be_cut(problem) else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
     out += markers_beside(problem)
@@ -52,6 +53,11 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
                 f"give it: [noise] sd = ... in {'metres' if noise.unit == 'm' else 'pixels'}, or record repeats"
             )
     return out
+
+
+def _could_be_cut(problem: Problem) -> bool:
+    """Whether takes are whole that could be fitted in pieces, as each of these would start as measured."""
+    return problem.pieces == 1.0 and all(problem.scenarios[name].start_motion is not None for name in problem.fit_on)
 
 
 def step_matters(

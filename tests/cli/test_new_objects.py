@@ -12,7 +12,7 @@ from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP, MEASURED_WINDOW
+from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP
 from muslin.core.series import PointSeries
 from muslin.core.study import build_problem, read_config
 
@@ -96,20 +96,6 @@ def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: py
     config = read_config(path)
     assert config.scenario.markers == "beside" and config.scenario.start == "measured"
     build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path)
-
-
-@pytest.mark.parametrize("lasts, window", [(2.0, None), (5.0, MEASURED_WINDOW)])
-def test_long_takes_of_a_moving_rope_are_fitted_in_pieces(tmp_path: Path, lasts: float, window: float | None) -> None:
-    points, motion = from_end_to_end(9)
-    seen = np.tile(points, (100, 1, 1))
-    take = Recording("one", PointSeries(np.linspace(0, lasts, 100), seen), motion)
-    save_measurement(Measurement((take,)), tmp_path / "m.zarr")
-    path = tmp_path / "s.toml"
-    assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
-    config = read_config(path)
-    assert config.study.window == window
-    problem = build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path)
-    assert len(problem.fit_on) == (4 if window else 1)
 
 
 @pytest.mark.parametrize("noise, near", [(3e-5, MEASURED_NEAR), (1e-3, None)])

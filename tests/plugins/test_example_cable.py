@@ -18,6 +18,9 @@ from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
+from muslin.inference.noise import Noise
+from muslin.inference.roughness import Roughness
+from muslin.inference.sequential import doubts
 
 FOLDER = ROOT / "examples/cable"
 FITTED = ("97", "104", "89", "66", "122")
@@ -99,6 +102,22 @@ def test_a_piece_knows_how_the_rope_was_bent_before(tmp_path: Path) -> None:
     )
     scene = coarse.scene(RopeMaterial(bending_rigidity=1e-3), np.zeros(3))
     np.testing.assert_allclose(scene.earlier, piece.earlier[:, ::2])
+
+
+@pytest.mark.parametrize("window", [None, 0.25])
+def test_a_fit_that_is_left_to_chance_says_that_pieces_would_help(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, window: float | None
+) -> None:
+    measured(tmp_path, [bent(k) for k in range(len(NAMES))])
+    path = tmp_path / "study.toml"
+    path.write_text(path.read_text().replace("window = 1.25 ", f"window = {window} " if window else "# window"))
+    study = Study.load(path, workers=0)
+    chaos = {name: np.ones(r.series.frames) for name, r in study.problem.recordings.items()}
+    monkeypatch.setattr(doubts, "roughness", lambda *_: Roughness(chaos, chaos, chaos))
+    with study.pool() as pool:
+        said = doubts.doubts(pool, study.problem.space, np.full(3, 0.5), Noise(0.005, 0.0, "test", "m", 0.01))
+    (chaotic,) = (sentence for sentence in said if "chaotic" in sentence)
+    assert ("[study] window = 1.25" in chaotic) == (window is None)
 
 
 def test_the_real_takes_of_the_example_are_there_and_can_be_simulated(tmp_path: Path) -> None:
