@@ -79,8 +79,9 @@ def _diagnosed(found: Findings) -> Verdict:
         if number(e["after"]) is None:
             drop = f"the {e['on']} error is {before} ({floor})"
         add = "" if found.after_inferred else f"muslin add {effects[0]} {file}" if effects else ""
-        verb = "are" if len(effects) > 1 else "is"
-        return Verdict("named", "good", _cap(f"{named} {verb} missing from the model; with it, {drop}."), detail, add)
+        verb, it = ("are", "them") if len(effects) > 1 else ("is", "it")
+        told = _cap(f"{named} {verb} missing from the model; with {it}, {drop}.")
+        return Verdict("named", "good", told, detail, add)
     if result["verdict"] == "tied":
         rivals = " or ".join(words(n) for n in effects)
         drop = f"The {e['on']} error is {before}, {floor}."
