@@ -126,6 +126,13 @@ def test_other_verdicts_claim_no_fall_of_the_error_but_a_tie(tmp_path: Path, ver
     assert ("with air drag (candidate)" in page.text) == (verdict != "no-misfit")
 
 
+def test_two_missing_effects_are_told_as_two(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group = study.results("r+")["diagnose"]
+    group.attrs["result"] = {**group.attrs["result"], "effects": ["air-drag", "viscous-damping"]}
+    assert "Air drag and viscous damping are missing from the model; with them, the" in page_of(study).text
+
+
 def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     study = make_study(tmp_path, "fit", "compare", "diagnose")
     page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))
