@@ -11,6 +11,7 @@ from .beside import Beside
 from .body import Body
 from .camera import Camera
 from .errors import InputError
+from .interpolation import interpolate
 from .kept_bend import KeptBend
 from .material import Material, RopeMaterial
 from .measurement import Recording
@@ -41,11 +42,8 @@ class StartMotion:
 
     def along(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Velocities and accelerations ``(count, 3)`` of that many vertices."""
-        own, wanted = np.arange(len(self.velocities)), np.linspace(0, len(self.velocities) - 1, count)
-        made = [
-            np.stack([np.interp(wanted, own, x) for x in v.T], axis=1) for v in (self.velocities, self.accelerations)
-        ]
-        return made[0], made[1]
+        own, wanted = np.arange(float(len(self.velocities))), np.linspace(0, len(self.velocities) - 1, count)
+        return interpolate(wanted, own, self.velocities), interpolate(wanted, own, self.accelerations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,10 +204,8 @@ def _equal(a: object, b: object) -> bool:
 
 def _on_mesh(shapes: FloatArray, count: int) -> FloatArray:
     """Shapes of a rope ``(H, V, 3)``, on a mesh of ``count`` vertices."""
-    own, wanted = np.arange(shapes.shape[1]), np.linspace(0, shapes.shape[1] - 1, count)
-    left = np.minimum(wanted.astype(np.int64), len(own) - 2)
-    share = (wanted - left)[:, None]
-    return np.asarray((1 - share) * shapes[:, left] + share * shapes[:, left + 1])
+    own, wanted = np.arange(float(shapes.shape[1])), np.linspace(0, shapes.shape[1] - 1, count)
+    return interpolate(wanted, own, shapes.swapaxes(0, 1)).swapaxes(0, 1)
 
 
 def marker_weights(count: int, ids: IntArray) -> FloatArray:

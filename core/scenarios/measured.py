@@ -9,6 +9,7 @@ from ..beside import Beside, curves
 from ..body import rope_line
 from ..differences import fourth_differences, robust_sd
 from ..errors import InputError
+from ..interpolation import interpolate
 from ..measurement import Recording, check_spatial
 from ..motion import inverse, rotate
 from ..parameters import Parameter
@@ -23,21 +24,21 @@ MEASURED_PRIORS = (
     Parameter("twist_rigidity", "N m2", 1e-5, 0.1, "log", "torque per twist rate"),
     Parameter("damping_time", "s", 1e-4, 1.0, "log", "of internal damping, C = beta K"),
 )
-#: Takes of a rope in motion are long, so steps need not be shorter than this [s]: recorded cables came out the same to
-#: .1 mm. Longer ones do not do: MuJoCo's own damping then stands in for the rope's.
+#: Takes of a rope in motion are long, so steps of a new study are no shorter than this [s]. Longer ones do not do:
+#: MuJoCo's own damping then stands in for the rope's.
 MEASURED_STEP = 0.0025
-#: How near the model of a rope in motion is meant to come [m], where it is seen better than that. Marker offsets, the
-#: bend that a cable keeps and its grip are known no better, and what every draw is off by tells draws apart no more.
+#: How near the model of a rope in motion is meant to come [m], where it is seen far better. Held against the noise of
+#: motion capture alone, every draw is as wrong as every other, and frames count as left to chance.
 MEASURED_NEAR = 0.005
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200
 #: Parabolas through the first frames go through so many at least, and through none later than this [s].
 _FEWEST, _LONGEST = 5, 0.3
-#: Shapes before the start are so far apart [s].
-_EARLIER = 0.03
 #: They fit where they leave no more than this times the noise.
 _WITHIN = 1.5
+#: Shapes before the start are so far apart [s].
+_EARLIER = 0.03
 
 
 def measured_start(scenario: Scenario, recording: Recording, beside: Beside | None = None) -> Scenario:
@@ -79,7 +80,7 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
     markers[np.arange(len(points)), left] = 1.0 - (share - left)
     markers[np.arange(len(points)), left + 1] = share - left
     evenly = np.linspace(0.0, along[-1], len(along))
-    local = np.stack([np.interp(evenly, along, local[:, k]) for k in range(3)], axis=1)
+    local = interpolate(evenly, along, local)
     start = GivenShape(local, along[-1], np.zeros(3))
     motion = first_motion(series, places)
     return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion, beside=beside)
@@ -102,8 +103,7 @@ def with_earlier(scenario: Scenario, recording: Recording) -> Scenario:
     out = np.empty((len(points), count, 3))
     for k, curve in enumerate(curves(points)[0]):
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
-        evenly = np.linspace(0.0, along[-1], count)
-        out[k] = np.stack([np.interp(evenly, along, x) for x in curve.T], axis=1)
+        out[k] = interpolate(np.linspace(0.0, along[-1], count), along, curve)
     return replace(scenario, earlier=out)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..body import Body
 from ..errors import InputError
+from ..interpolation import interpolate
 from ..motion import rotate
 from ..obstacles import Cylinder, Obstacle
 
@@ -37,8 +38,8 @@ class GivenShape:
         scale = float(body.measures.sum()) / self.measure
         local = self.about + scale * (self.vertices - self.about)
         if len(local) != len(body.vertices):  # a rope, on another mesh
-            own, wanted = np.arange(len(local)), np.linspace(0, len(local) - 1, len(body.vertices))
-            local = np.stack([np.interp(wanted, own, x) for x in local.T], axis=1)
+            wanted = np.linspace(0, len(local) - 1, len(body.vertices))
+            local = interpolate(wanted, np.arange(float(len(local))), local)
         return np.asarray(rotate(poses[0, 3:], local) + poses[0, :3])
 
 

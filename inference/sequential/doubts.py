@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
 from ...core.parameters import ParameterSpace
@@ -15,6 +17,8 @@ from ..roughness import Roughness, roughness, unrepeatable
 
 #: A step that moves the model by more than this is told of [noise standard deviations].
 STEP_MATTERS = 1.0
+#: Recordings that are left to chance are to be fitted in pieces of this length [s], or halves if they are shorter.
+PIECE = 1.25
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -35,13 +39,14 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
     rough = roughness(pool, space, unit, problem.fit_on)
     if failing := [n for n in problem.fit_on if n not in rough.sd]:
         out.append(f"close to the best fit {', '.join(failing)} cannot be simulated, so ± means little")
+    piece = _piece(problem)
     if loose := unrepeatable(rough, problem.recordings, noise):
         out.append(
             "the simulation is chaotic: next to nothing in the parameters moves "
             + "; ".join(loose)
             + "; what it does there is chance and does not count. Where chance does not decide in reality, "
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
-            + ("; fitted in pieces, it does not come so far: [study] window = 1.25" if _could_be_cut(problem) else "")
+            + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.2g}" if piece else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
     out += markers_beside(problem)
@@ -55,9 +60,12 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
     return out
 
 
-def _could_be_cut(problem: Problem) -> bool:
-    """Whether takes are whole that could be fitted in pieces, as each of these would start as measured."""
-    return problem.pieces == 1.0 and all(problem.scenarios[name].start_motion is not None for name in problem.fit_on)
+def _piece(problem: Problem) -> float | None:
+    """Length of pieces [s] that takes could be fitted in, as each would start as measured; None if they could not."""
+    scenarios = [problem.scenarios[name] for name in problem.fit_on]
+    if problem.pieces > 1.0 or any(s.start_motion is None for s in scenarios):
+        return None
+    return min(PIECE, *(float(np.ptp(s.times)) / 2 for s in scenarios))
 
 
 def step_matters(

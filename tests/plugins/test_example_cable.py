@@ -112,12 +112,13 @@ def test_a_fit_that_is_left_to_chance_says_that_pieces_would_help(
     path = tmp_path / "study.toml"
     path.write_text(path.read_text().replace("window = 1.25 ", f"window = {window} " if window else "# window"))
     study = Study.load(path, workers=0)
+    lasts = 0.5  # so that pieces are its halves
     chaos = {name: np.ones(r.series.frames) for name, r in study.problem.recordings.items()}
     monkeypatch.setattr(doubts, "roughness", lambda *_: Roughness(chaos, chaos, chaos))
     with study.pool() as pool:
         said = doubts.doubts(pool, study.problem.space, np.full(3, 0.5), Noise(0.005, 0.0, "test", "m", 0.01))
     (chaotic,) = (sentence for sentence in said if "chaotic" in sentence)
-    assert ("[study] window = 1.25" in chaotic) == (window is None)
+    assert (f"[study] window = {lasts / 2}" in chaotic) == (window is None)
 
 
 def test_the_real_takes_of_the_example_are_there_and_can_be_simulated(tmp_path: Path) -> None:
