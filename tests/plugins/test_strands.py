@@ -10,6 +10,8 @@ from muslin.core.bending import RopeBending
 from muslin.core.body import rope_line
 from muslin.core.material import RopeMaterial
 from muslin.core.motion import Motion
+from muslin.core.obstacles import Table
+from muslin.core.registry import REGISTRY
 from muslin.core.rollout import rollout
 from muslin.core.scenario import Scenario
 from muslin.core.scene import Scene
@@ -57,6 +59,27 @@ def test_strands_know_how_they_slid_before_the_start():
     assert moment(piece, path[-1] * LENGTH) == pytest.approx(expected, rel=1e-9)
     for k in (10.0, -20.0, 5.0):
         assert moment(piece, k * LENGTH) == pytest.approx(moment(whole, k * LENGTH), rel=1e-9)
+
+
+def test_earlier_shapes_tilt_with_the_world():
+    """Engines know level tables only: what the rope was like before stands askew as the rope itself does."""
+    seen = []
+
+    class Looks(RopeHysteresis):
+        def bind(self, scene, masses):
+            seen.append((scene.start_positions, scene.earlier))
+            return super().bind(scene, masses)
+
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -0.3]]), 7)
+    still = Scenario(
+        "held", body, (np.array([0, 1]),), Motion.still(1), np.array([0.0, 0.01]), np.eye(7), np.zeros(0, int)
+    )
+    piece = replace(still, earlier=still.world_vertices()[None], obstacles=(Table(-1.0),))
+    tilt = REGISTRY.get("effect", "table-tilt")(about_x=0.2, about_y=-0.1)
+    rollout(engine("mujoco"), piece, RopeMaterial(), [Looks(sliding_share=0.5, slip_curvature=1.0), tilt])
+    ((start, earlier),) = seen
+    np.testing.assert_allclose(earlier[0], start, atol=1e-12)
+    assert np.abs(start - still.world_vertices()).max() > 0.01
 
 
 def test_a_bend_is_met_by_all_of_the_rigidity_and_then_by_what_does_not_slide():
