@@ -125,7 +125,7 @@ def _result(
                 "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in coefficients.items()},
                 "explained": e.explained(c),
                 "z": e.z(c),
-                "behind": c.rss - e.nearest.rss,
+                "behind": e.behind(c, e.nearest),
                 "objection": objection(e, c),
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,

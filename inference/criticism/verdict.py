@@ -97,6 +97,16 @@ class Evidence:
             return bool(after < before + HELD_OUT_SLACK)
         return bool(after < before - HELD_OUT_SHARE * (before - 1.0))
 
+    def behind(self, candidate: Candidate, best: Candidate) -> float:
+        """How much less probable the candidate makes the residuals than the ``best`` one, in -2 log likelihood.
+
+        The noise is known to :attr:`noise_error` only, and averaged over: the likelihood is Student's t, of as many
+        degrees of freedom as the estimate of the noise is worth (Gelman et al., Bayesian Data Analysis, 3.2). Where
+        noise is known well, and is all that the best leaves, it is the difference of their residual sums of squares.
+        """
+        freedom = 0.5 / max(self.noise_error, 1e-6) ** 2
+        return float((freedom + self.count) * np.log((freedom + candidate.rss) / (freedom + best.rss)))
+
     def left(self, candidate: Candidate) -> float:
         """What a candidate leaves beyond what noise may [noise variances]."""
         return max(0.0, candidate.rss - self.count - self.chance)
@@ -150,7 +160,7 @@ def decide(e: Evidence) -> Decision:
     if not passing:
         return Decision("none", ())
     best = passing[0]
-    rivals = [c for c in passing[1:] if c.rss - best.rss < MARGIN + SHARE_LEFT * e.left(best)]
+    rivals = [c for c in passing[1:] if e.behind(c, best) < MARGIN or c.rss - best.rss < SHARE_LEFT * e.left(best)]
     if rivals:
         return Decision("tied", (best.name, *(c.name for c in rivals)))
     return Decision("named", (best.name,))

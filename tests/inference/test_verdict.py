@@ -52,6 +52,21 @@ def test_tied_when_the_difference_is_small_against_what_both_leave() -> None:
     assert decide(e) == Decision("named", ("drag",))
 
 
+def test_tied_when_the_noise_may_be_as_large_as_the_difference() -> None:
+    """Two short repeats tell the noise to a third; what it may be is averaged over."""
+    best, rival = candidate("damping", 1.0 * COUNT), candidate("drag", 1.0 * COUNT + 14)
+    sure = evidence(9 * COUNT, best, rival)
+    assert sure.behind(rival, best) == pytest.approx(14, rel=0.02)
+    assert decide(sure) == Decision("named", ("damping",))
+    few = replace(sure, count=50.0, noise_error=0.38)
+    best, rival = (replace(c, fit=replace(c.fit, white=np.sqrt(rss / COUNT) * np.ones(int(COUNT)), count=50.0))
+                   for c, rss in ((best, 80.0), (rival, 94.0)))  # fmt: skip
+    vague = replace(few, rss_plain=9000.0, candidates=(best, rival))
+    assert vague.behind(rival, best) == pytest.approx(53.5 * np.log(97.46 / 83.46), rel=0.01)
+    assert decide(vague).verdict == "tied"
+    assert decide(replace(vague, noise_error=0.01)) == Decision("named", ("damping",))
+
+
 def test_not_named_when_much_is_left_that_neither_noise_nor_numerics_make() -> None:
     """Another effect, one that is in no list, is half mimicked by one that is."""
     half = candidate("wind", 3.5 * COUNT)
