@@ -134,7 +134,7 @@ def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
     if not known.any():
         return None
     evenly = np.linspace(0.0, places[-1], _FINE)
-    speed, change = (np.stack([np.interp(evenly, places[known], x) for x in v[known].T], axis=1) for v in best)
+    speed, change = (interpolate(evenly, places[known], v[known]) for v in best)
     return StartMotion(speed, change)
 
 
