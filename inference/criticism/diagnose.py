@@ -143,6 +143,7 @@ def _result(
         "candidates": rows,
         "error": {
             "noise": work.fit.noise.sd,
+            "noise_error": work.fit.noise.relative_error,
             "before": before,
             "after": later if changed else before,
             "unit": work.fit.noise.unit,

@@ -11,6 +11,8 @@ from .verdict import EXPLAINS
 _WORTH_TELLING = 0.2
 #: A coefficient known to this part of its size needs no better experiment.
 _KNOWN = 0.1
+#: A noise that is known less well than this [relative] is told with how well.
+_VAGUE = 0.1
 
 
 def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]]) -> dict[str, str]:
@@ -76,9 +78,15 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
             f"{_reason(best, result)}.{_in_part(best, error['unit'])}"
         )
     if verdict == "no-misfit":
+        vague = error["noise_error"] > _VAGUE
+        does = (
+            f"and that is known to {100 * error['noise_error']:.0f} % only"
+            if vague
+            else "which is what noise alone does"
+        )
         return (
             f"No misfit: the model differs from the measurement by {ratio:.2f} times the noise of "
-            f"{length(error['noise'], error['unit'])}, which is what noise alone does."
+            f"{length(error['noise'], error['unit'])}, {does}."
         )
     if result["unfinished"]:
         return (

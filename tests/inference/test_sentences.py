@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _in_part, _unchecked
+from muslin.inference.criticism.sentences import _in_part, _unchecked, _verdict
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -50,6 +50,14 @@ def test_held_out_motions_that_show_nothing_are_told() -> None:
     assert not _unchecked({"effects": ["wind", "drag"], "candidates": rows})
     assert not _unchecked({"effects": [], "candidates": rows})
     assert not _unchecked({"effects": ["wind"], "candidates": [{"name": "wind", "held_out_shows": None}]})
+
+
+def test_noise_that_is_hardly_known_is_told_as_such() -> None:
+    known = {"verdict": "no-misfit", "effects": [], "candidates": [], "evidence": {"misfit": 1.5**2}}
+    error = {"noise": 0.095, "unit": "m", "held_out": False, "before": 0.1, "after": 0.1}
+    told = _verdict(known | {"error": error | {"noise_error": 0.22}}, {})
+    assert "1.50 times the noise of 95.0 mm, and that is known to 22 % only" in told
+    assert "what noise alone does" in _verdict(known | {"error": error | {"noise_error": 0.02}}, {})
 
 
 def test_numbers_that_move_the_model_are_told_where_a_misfit_stays() -> None:
