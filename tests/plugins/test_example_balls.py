@@ -87,4 +87,16 @@ def test_the_air_is_found_on_a_whiffle_ball_and_not_on_a_bowling_ball(tmp_path: 
     assert found["verdict"] in ("named", "tied") and set(found["effects"]) <= {"air-drag", "viscous-damping"}
     assert found["error"]["after"] < 0.3 < 1.0 < found["error"]["before"]
     heavy.fit()
-    assert heavy.diagnose().result["verdict"] in ("no-misfit", "cannot-tell")
+    assert heavy.diagnose().result["verdict"] == "no-misfit"
+
+
+@pytest.mark.slow
+def test_the_law_of_drag_on_a_tennis_ball_is_left_open(tmp_path: Path) -> None:
+    """Two drops tell the noise to a fifth only; linear and quadratic drag are both within what it may be."""
+    pytest.importorskip("torch")
+    pytest.importorskip("mujoco")
+    pytest.importorskip("meshio")
+    study = study_of("tennis", tmp_path, workers=1)
+    study.fit()
+    found = study.diagnose().result
+    assert found["verdict"] == "tied" and set(found["effects"]) == {"air-drag", "viscous-damping"}
