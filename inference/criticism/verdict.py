@@ -160,7 +160,7 @@ def decide(e: Evidence) -> Decision:
     if not passing:
         return Decision("none", ())
     best = passing[0]
-    rivals = [c for c in passing[1:] if e.behind(c, best) < MARGIN or c.rss - best.rss < SHARE_LEFT * e.left(best)]
+    rivals = [c for c in passing[1:] if e.behind(c, best) < MARGIN + SHARE_LEFT * e.left(best)]
     if rivals:
         return Decision("tied", (best.name, *(c.name for c in rivals)))
     return Decision("named", (best.name,))
