@@ -23,7 +23,7 @@ CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
     "held_out_shows", "identifiability", "refitted",
 }  # fmt: skip
-ERROR = {"noise", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
+ERROR = {"noise", "noise_error", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
 
 
 def check_schema(result: dict[str, object]) -> None:
