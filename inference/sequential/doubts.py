@@ -46,7 +46,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             + "; ".join(loose)
             + "; what it does there is chance and does not count. Where chance does not decide in reality, "
             "set [material] damping_time = 0.005 or lower [simulator] time_step"
-            + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.2g}" if piece else "")
+            + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
     out += markers_beside(problem)

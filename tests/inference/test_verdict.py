@@ -8,7 +8,7 @@ import pytest
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
 from muslin.inference.criticism.held_out import HeldOut
-from muslin.inference.criticism.verdict import Decision, Evidence, decide, objection
+from muslin.inference.criticism.verdict import MARGIN, SHARE_LEFT, Decision, Evidence, decide, objection
 from muslin.inference.polish import Polished
 
 COUNT = 3000.0
@@ -50,6 +50,16 @@ def test_tied_when_the_difference_is_small_against_what_both_leave() -> None:
     assert decide(e).verdict == "tied"
     e = evidence(9 * COUNT, candidate("drag", 2.0 * COUNT, numerics=left), candidate("damping", 2.8 * COUNT))
     assert decide(e) == Decision("named", ("drag",))
+
+
+def test_rivals_are_allowed_the_margin_beside_a_share_of_what_is_left() -> None:
+    best = candidate("damping", 1.2 * COUNT)
+    share = SHARE_LEFT * evidence(9 * COUNT, best).left(best)
+    assert share > MARGIN
+    between = candidate("drag", best.rss + share + MARGIN / 2)
+    assert decide(evidence(9 * COUNT, best, between)).verdict == "tied"
+    beyond = candidate("drag", best.rss + 2 * (share + MARGIN))
+    assert decide(evidence(9 * COUNT, best, beyond)) == Decision("named", ("damping",))
 
 
 def test_tied_when_the_noise_may_be_as_large_as_the_difference() -> None:
