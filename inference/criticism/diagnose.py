@@ -45,7 +45,7 @@ def diagnose(study: Study) -> Diagnosis:
         pair = BeforeAfter(work, started, (found.after.space, later))
         plain = found.first.plain
         joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
-        found = replace(found, after=joint.nearest)
+        found = _past_chance(work, replace(found, after=joint.nearest))
         count = work.simulations
     result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
@@ -66,6 +66,16 @@ def diagnose(study: Study) -> Diagnosis:
         )
         group.attrs["finished"] = True
     return Diagnosis(result, tuple(paragraphs))
+
+
+def _past_chance(work: Work, found: Findings) -> Findings:
+    """Coefficients that are told of with what is known of them where chance moves the model, too."""
+    found = replace(found, after=work.past_chance(found.after)) if found.verdict == "named" else found
+    if found.verdict != "tied":
+        return found
+    e = found.first.evidence
+    candidates = tuple(work.past_chance(c) if c.name in found.effects else c for c in e.candidates)
+    return replace(found, first=replace(found.first, evidence=replace(e, candidates=candidates)))
 
 
 def _fitted(study: Study) -> FloatArray:

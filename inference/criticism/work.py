@@ -11,6 +11,7 @@ from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import Discrepancy
 from ..polish import Objective, Polished, polish
 from ..residuals import Residual
+from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.fitting import offsets_of
 from ..sequential.result import FitResult
@@ -151,10 +152,18 @@ class Work:
             after: with all that was found.
             plain: fits of the model as it was, of which the nearest counts.
         """
-        has = set(self.problem.space.names)  # the study's own effects are in every space already
-        effects = tuple(dict.fromkeys(n.split(".", 1)[0] for n in after.space.names if "." in n and n not in has))
+        effects = self._effects_of(after)
         later = replace(after, fit=self._again(effects, after.fit))
         return self.evidence((), min((self._again((), fit) for fit in plain), key=lambda p: p.rss), [later])
+
+    def _effects_of(self, candidate: Candidate) -> tuple[str, ...]:
+        """All that a candidate's model has beyond the study's own, which are in every space already."""
+        has = set(self.problem.space.names)
+        return tuple(dict.fromkeys(n.split(".", 1)[0] for n in candidate.space.names if "." in n and n not in has))
+
+    def past_chance(self, candidate: Candidate) -> Candidate:
+        """With a covariance that holds where the model cannot be repeated, too."""
+        return replace(candidate, fit=seen_past_chance(self.objective(self._effects_of(candidate)), candidate.fit))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
         """The same point with residuals that are whitened as they are now."""

@@ -17,6 +17,7 @@ from ..noise import Noise, estimate_noise
 from ..observe import Observer
 from ..polish import Objective, Polished, polish_from
 from ..residuals import Offsets, residual
+from ..rough_curvature import seen_past_chance
 from ..roughness import roughness
 from .bounds import at_bounds, bound_notes
 from .doubts import doubts
@@ -138,6 +139,7 @@ def _polished(
         discrepancy = NONE
     objective = Objective(pool, space, names, noise, offsets, discrepancy=discrepancy)
     best = polish_from(objective, _draws_in_order(study, store, noise, takes, upto, discrepancy))
+    best = seen_past_chance(objective, best)
     return best, discrepancy.step, doubts(pool, space, best.unit, noise)
 
 

@@ -1,0 +1,68 @@
+"""What is said to be known of parameters where the residuals answer to next to nothing, against the truth."""
+
+import numpy as np
+
+from muslin.core.arrays import FloatArray
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.discrepancy import Discrepancy
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, polish
+from muslin.inference.residuals import Offsets
+from muslin.inference.rough_curvature import seen_past_chance
+
+COUNT, TRUTH = 60, np.array([0.35, 0.6])
+
+
+class Rough(Objective):
+    """Residuals that are linear in two parameters, noise, and a chance that no neighbour shares.
+
+    Args:
+        seed: of the problem.
+        size: standard deviation of chance, in units of the noise.
+    """
+
+    def __init__(self, seed: int, size: float) -> None:
+        space = ParameterSpace((Parameter("a", "1", 0, 1), Parameter("b", "1", 0, 1)))
+        discrepancy = Discrepancy(chance={"all": np.full(COUNT, size**2)})
+        super().__init__(None, space, ["all"], Noise(1.0, 0.0, "test", "m", 0.01), Offsets(), discrepancy=discrepancy)  # type: ignore[arg-type]
+        rng = np.random.default_rng(seed)
+        self.seed, self.size = seed, size
+        self.matrix, self.error = rng.normal(size=(COUNT, 2)) * 5, rng.normal(size=COUNT)
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return [self.discrepancy.whitened("all", self.raw(u)) for u in units]
+
+    def raw(self, unit: FloatArray) -> FloatArray:
+        chance = np.random.default_rng([self.seed, *unit.view(np.uint64).tolist()]).normal(size=COUNT)
+        return np.asarray(self.matrix @ (unit - TRUTH) + self.error + self.size * chance)
+
+
+def away(size: float, *, wide: bool) -> FloatArray:
+    """How far estimates are from the truth [standard deviations] ``(40, 2)``."""
+    found = []
+    for seed in range(40):
+        objective = Rough(seed, size)
+        best = polish(objective, np.array([0.5, 0.5]))
+        best = seen_past_chance(objective, best) if wide else best
+        found.append((best.unit - TRUTH) / np.sqrt(np.diag(best.covariance)))
+    return np.array(found)
+
+
+def test_intervals_hold_the_truth_where_chance_decides() -> None:
+    assert np.mean(np.abs(away(0.4, wide=False)) < 1.645) < 0.3  # derivatives are of chance
+    held = np.mean(np.abs(away(0.4, wide=True)) < 1.645)
+    assert held > 0.85
+    assert np.std(away(0.4, wide=True)) > 0.15  # and not by saying nothing
+
+
+def test_nothing_changes_where_there_is_no_chance() -> None:
+    objective = Rough(3, 0.0)
+    best = polish(objective, np.array([0.5, 0.5]))
+    assert seen_past_chance(objective, best) is best
+
+
+def test_no_less_is_known_than_the_prior_says() -> None:
+    objective = Rough(4, 0.9)
+    objective.matrix *= 1e-3
+    best = seen_past_chance(objective, polish(objective, np.array([0.5, 0.5])))
+    assert (np.diag(best.covariance) <= 1.0 / 12.0 + 1e-12).all()
