@@ -11,10 +11,15 @@ _ELSEWHERE = 1.5
 
 
 def further(result: dict[str, Any]) -> str:
-    """That one of several effects is missing beside those that were named."""
+    """That one of several effects is missing beside those that were named, or one beside any of several."""
     several = result["further"]
     if not several:
         return ""
+    if result["verdict"] == "tied":
+        return (
+            f"Something more is missing, whichever of {', '.join(result['effects'])} it is: {' and '.join(several)}. "
+            "Add one of them and diagnose again: it is named then."
+        )
     return (
         f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(several)}; these data "
         "cannot tell which."

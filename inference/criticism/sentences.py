@@ -68,7 +68,8 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
         )
         return (
             f"Tied: {' and '.join(named)}. The object {effects[named[0]].symptom}; each explains the misfit about as "
-            f"well ({shares}), and these data cannot tell them apart. With {named[0]}, {fall}, {noise}."
+            f"well ({shares}), and these data cannot tell them apart. With "
+            f"{' and '.join([named[0], *result['further']])}, {fall}, {noise}."
         )
     if verdict == "none":
         best = result["candidates"][0]
@@ -161,6 +162,8 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
         return "what it leaves is neither noise nor what the numbers of the model make"
     if why == "held-out":
         return "motions that it was not fitted to get no better"
+    if len(result["effects"]) > 1:
+        return f"less than {result['effects'][0]} with {' and '.join(result['effects'][1:])} beside it"
     first = result["candidates"][0]["name"]
     return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
 

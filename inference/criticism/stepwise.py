@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ...core.arrays import FloatArray
 from .candidate import Candidate
 from .settle import settled
@@ -25,7 +27,8 @@ class Findings:
         first: the first stage, with every candidate alone.
         last: the stage that the verdict comes from.
         after: the model with what was named; where nothing was, the candidate that came nearest.
-        further: effects beside the named ones of which one is missing, too, and which is not to be told.
+        further: effects beside the named ones of which one is missing, too, and which is not to be told; beside tied
+            ones, an effect that is missing whichever of them it is.
         rest: what was decided with the named ones in the model; None where that was not looked into.
     """
 
@@ -45,7 +48,8 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     if verdict == "none":
         return _pair(work, names, first) or Findings("none", (), first, first, _nearest(first))
     if verdict == "tied":
-        return Findings("tied", first.decision.effects, first, first, first.chosen)
+        tied = Findings("tied", first.decision.effects, first, first, first.chosen)
+        return _with_another(work, names, tied) or tied
     if verdict != "named":
         return Findings(verdict, (), first, first, _nearest(first))
     return _forward(work, names, Findings("named", first.decision.effects, first, first, first.chosen))
@@ -85,6 +89,36 @@ def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
             pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
             return _forward(work, names, _without_idle(work, pair))
     return None
+
+
+def _with_another(work: Work, names: list[str], found: Findings) -> Findings | None:
+    """A second effect beside those that are tied; with it in the model they may be told apart."""
+    first, lead = found.first, found.after
+    others = [n for n in names if n not in found.effects]
+    if first.evidence.left(lead) == 0.0 or not others or not work.may_go_on():
+        return None
+    stage = settled(work, run_stage(work, (lead.name,), others, lead.fit.unit))
+    if stage.decision.verdict != "named":
+        return None
+    second = stage.chosen
+    pairs = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in found.effects[1:]}
+    best = min(pairs, key=lambda n: pairs[n].rss)
+    margin = MARGIN + SHARE_LEFT * stage.evidence.left(pairs[best])
+    near = [n for n in sorted(pairs, key=lambda n: pairs[n].rss) if pairs[n].rss - pairs[best].rss < margin]
+    if len(near) > 1:
+        after = work.judged(pairs[best])
+        return Findings("tied", tuple(near), first, stage, after, further=(second.name,))
+    named = Findings("named", (best, second.name), first, stage, work.judged(pairs[best]))
+    return _forward(work, names, _without_idle(work, named))
+
+
+def _beside(work: Work, rival: Candidate, second: Candidate) -> Candidate:
+    """The model with a rival in place of the effect that ``second`` was found beside."""
+    effects = (rival.name, second.name)
+    space, values = work.space(effects), dict(zip(second.space.names, second.fit.unit, strict=True))
+    values |= dict(zip(rival.space.names, rival.fit.unit, strict=True))
+    fit = work.polished(effects, np.array([values[n] for n in space.names]), MORE_EVALUATIONS)
+    return replace(second, space=space, base=len(rival.space), fit=fit)
 
 
 def _without_idle(work: Work, found: Findings) -> Findings:

@@ -1,0 +1,100 @@
+"""Effects that are tied may be told apart once a second effect is in the model."""
+
+import numpy as np
+import pytest
+from test_verdict import COUNT, candidate, evidence
+
+from muslin.core.arrays import FloatArray
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.criticism import stepwise
+from muslin.inference.criticism.candidate import Candidate
+from muslin.inference.criticism.caveats import further
+from muslin.inference.criticism.stage import Stage
+from muslin.inference.criticism.stepwise import Findings, find
+from muslin.inference.criticism.verdict import Decision, decide
+from muslin.inference.polish import Polished
+
+
+class Bench:
+    """Stands in for rollouts: a fit of these effects leaves so much [noise variances]."""
+
+    def __init__(self, left: dict[tuple[str, ...], float], budget: bool = True) -> None:
+        self.left, self.budget = left, budget
+
+    def may_go_on(self) -> bool:
+        return self.budget
+
+    def space(self, effects: tuple[str, ...]) -> ParameterSpace:
+        names = ["stiffness", *(f"{e}.strength" for e in effects)]
+        return ParameterSpace(tuple(Parameter(n, "1", 0, 1) for n in names))
+
+    def polished(self, effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
+        assert len(unit) == len(self.space(effects))
+        white = np.full(int(COUNT), np.sqrt(self.left[effects] / COUNT))
+        return Polished(unit, white, np.zeros((len(white), len(unit))), np.eye(len(unit)), COUNT)
+
+    def judged(self, c: Candidate) -> Candidate:
+        return c
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tuple[Findings, list[tuple[str, ...]]]:
+    """What is found where tilt and wind leave so much alone and with drag, and the stages that were run."""
+    alone, with_tilt, with_wind = request.param
+    left = {("tilt",): alone, ("wind",): alone + 1.0, ("tilt", "drag"): with_tilt, ("wind", "drag"): with_wind}
+    bench, stages = Bench(left | {("drag",): 8 * COUNT}), list[tuple[str, ...]]()
+
+    def run_stage(work: Bench, effects: tuple[str, ...], names: list[str], start: FloatArray) -> Stage:
+        stages.append(effects)
+        if not effects:
+            each = {"tilt": alone, "wind": alone + 1.0, "drag": 8 * COUNT}
+            e = evidence(9 * COUNT, *(candidate(n, rss) for n, rss in each.items()))
+            return Stage(effects, candidate("x", 9 * COUNT).fit, {}, e, decide(e))
+        if len(effects) > 1:  # nothing more is missing
+            e = evidence(with_tilt, candidate("mass", with_tilt))
+            return Stage(effects, bench.polished(("tilt", "drag"), start, 1), {}, e, Decision("no-misfit", ()))
+        space = bench.space((*effects, "drag"))
+        fit = bench.polished((*effects, "drag"), np.full(3, 0.5), 1)
+        drag = Candidate("drag", space, 2, fit, {"other": 0.003}, 1.0, refitted=True)
+        e = evidence(alone, drag)
+        named = Decision("named", ("drag",)) if with_tilt < 0.95 * alone else Decision("none", ())
+        return Stage(effects, candidate("x", alone).fit, {}, e, named)
+
+    monkeypatch.setattr(stepwise, "run_stage", run_stage)
+    monkeypatch.setattr(stepwise, "settled", lambda work, stage: stage)
+    return find(bench, ["tilt", "wind", "drag"], np.full(1, 0.5)), stages  # type: ignore[arg-type]
+
+
+def outcomes(*cases: tuple[float, float, float]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("found", [tuple(x * COUNT for x in c) for c in cases], indirect=True)
+
+
+@outcomes((2.0, 1.0, 1.8))
+def test_a_second_effect_tells_the_tied_ones_apart(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects, found[0].further) == ("named", ("tilt", "drag"), ())
+
+
+@outcomes((2.0, 1.8, 1.0))
+def test_it_may_be_the_other_one(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects) == ("named", ("wind", "drag"))
+    assert found[0].after.space.names == ("stiffness", "wind.strength", "drag.strength")
+
+
+@outcomes((2.0, 1.0, 1.0))
+def test_or_leave_them_tied_and_be_missing_beside_either(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects, found[0].further) == ("tied", ("tilt", "wind"), ("drag",))
+
+
+@outcomes((2.0, 2.0, 2.0))
+def test_where_there_is_none_they_stay_tied(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects, found[0].further) == ("tied", ("tilt", "wind"), ())
+
+
+@outcomes((1.0, 1.0, 1.0))
+def test_no_other_is_looked_for_where_nothing_is_left(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[1]) == ("tied", [()])
+
+
+def test_what_is_missing_beside_either_is_told() -> None:
+    said = further({"verdict": "tied", "effects": ["tilt", "wind"], "further": ["drag"]})
+    assert "whichever of tilt, wind it is: drag" in said
