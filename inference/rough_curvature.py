@@ -26,7 +26,7 @@ class _Difference:
     Args:
         slope: of the white residuals ``(N,)``.
         chance: what chance adds to its square, in the mean.
-        luck: how much less the least square is than what lies around it, but for the slope [noise variances].
+        luck: how much less the square sum is in the middle than around it, but for the slope [noise variances].
     """
 
     slope: FloatArray
@@ -44,8 +44,9 @@ def seen_past_chance(objective: Objective, best: Polished) -> Polished:
     With ``w(x)`` at three points, ``d = w(x + h) - w(x - h)`` and ``e = w(x + h) + w(x - h) - 2 w(x)``, chance ``c`` of
     each point adds ``2 |c|^2`` to ``|d|^2`` and ``6 |c|^2`` to ``|e|^2``: a third of the latter is taken off the
     former, and ``h`` grows until little is to be taken off (Moré and Wild, *Estimating derivatives of noisy
-    simulations*, 2012). The square sum then is a parabola and a chance of size ``w e + |e|^2 / 4`` on top. A search
-    goes where that is least, as far from the bottom of the parabola as it pays, so the covariance grows by so much.
+    simulations*, 2012). The square sum then is a parabola and chance on top, which shows in ``w e + |e|^2 / 4``, by
+    how much the neighbours leave more than a parabola would. A search goes where that is least, as far from the bottom
+    of the parabola as it pays, so the covariance grows by the root mean square of it.
 
     Args:
         objective: that was made least.
@@ -63,7 +64,7 @@ def seen_past_chance(objective: Objective, best: Polished) -> Polished:
     values, vectors = np.linalg.eigh(information)
     # the uniform prior of a unit interval has variance 1/12
     covariance = (vectors / (np.maximum(values, 0.0) + 12.0)) @ vectors.T
-    luck = max(0.0, float(np.mean([differences[0].luck for differences in found])))
+    luck = float(np.sqrt(np.mean([differences[0].luck ** 2 for differences in found])))
     grown = (1.0 + luck) * covariance
     scale = np.sqrt(np.minimum(1.0, 1.0 / 12.0 / np.diag(grown)))  # no less is known than the prior says
     return replace(best, covariance=np.asarray(grown * np.outer(scale, scale), float))
