@@ -8,7 +8,7 @@ import typer
 from ..core.errors import InputError
 from ..core.registry import REGISTRY
 from ..core.study import Study
-from .console import ProgressView, command, next_step, say
+from .console import ProgressView, add_commands, command, next_step, say
 from .output import check_output, write_json
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
@@ -82,9 +82,10 @@ def diagnose(
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:
-        output = study.with_name(f"{study.stem}-with-{effects[0]}.toml")
-        further = [command("next", study)] if verdict.get("verdict") == "tied" else []
-        next_step(command("add", effects[0], study, "-o", output), *further, command("report", study))
+        tied = verdict.get("verdict") == "tied"
+        chosen = [effects[0], *(verdict.get("further") or [])] if tied else effects
+        further = [command("next", study)] if tied else []
+        next_step(add_commands(study, chosen), *further, command("report", study))
     else:
         further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])
         in_pixels = verdict.get("error", {}).get("unit") == "px"  # unknown needs metres

@@ -1,9 +1,11 @@
 """The verdict: one sentence that a reader takes away, and one that qualifies it."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from ...core.errors import MuslinError
 from ...core.study.objects import object_of
+from ..console import add_commands
 from .findings import Findings, number
 from .words import errors, length, sentence, words
 
@@ -78,17 +80,21 @@ def _diagnosed(found: Findings) -> Verdict:
         drop = f"the {e['on']} error falls from {before} to {after} ({floor})"
         if number(e["after"]) is None:
             drop = f"the {e['on']} error is {before} ({floor})"
-        add = "" if found.after_inferred else f"muslin add {effects[0]} {file}" if effects else ""
+        add = "" if found.after_inferred else add_commands(Path(file), effects)
         verb, it = ("are", "them") if len(effects) > 1 else ("is", "it")
         told = _cap(f"{named} {verb} missing from the model; with {it}, {drop}.")
         return Verdict("named", "good", told, detail, add)
     if result["verdict"] == "tied":
         rivals = " or ".join(words(n) for n in effects)
+        beside = [str(n) for n in result.get("further") or []]
         drop = f"The {e['on']} error is {before}, {floor}."
         if effects and number(e["after"]) is not None:
-            drop = f"With {words(effects[0])}, the {e['on']} error falls from {before} to {after} ({floor})."
-        add = "" if found.after_inferred or not effects else f"muslin add {effects[0]} {file}"
+            added = " and ".join(words(n) for n in [effects[0], *beside])
+            drop = f"With {added}, the {e['on']} error falls from {before} to {after} ({floor})."
+        add = "" if found.after_inferred or not effects else add_commands(Path(file), [effects[0], *beside])
         missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
+        if beside:
+            missing += f" Whichever it is, {' and '.join(words(n) for n in beside)} is missing, too."
         return Verdict("tied", "open", f"{missing} {drop}", detail, add)
     text = {
         "none": f"The model misses the measurement by {before} where noise is {noise}, and no candidate explains it.",

@@ -16,10 +16,7 @@ def further(result: dict[str, Any]) -> str:
     if not several:
         return ""
     if result["verdict"] == "tied":
-        return (
-            f"Something more is missing, whichever of {', '.join(result['effects'])} it is: {' and '.join(several)}. "
-            "Add one of them and diagnose again: it is named then."
-        )
+        return f"Something more is missing, whichever of {', '.join(result['effects'])} it is: {' and '.join(several)}."
     return (
         f"Something more is missing beside {' and '.join(result['effects'])}: one of {', '.join(several)}; these data "
         "cannot tell which."

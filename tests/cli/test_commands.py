@@ -76,6 +76,19 @@ def test_diagnose_writes_json_and_names_the_command_to_add(
     assert "muslin add" not in capsys.readouterr().out
 
 
+def test_all_that_was_named_is_added_by_the_next_command(
+    step: Callable[..., None], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    step("diagnose", lambda s: Result({"verdict": "named", "effects": ["wind", "gravity-tilt"]}))
+    assert status("diagnose", str(study)) == 0
+    between = study.with_name(f"{study.stem}-with-wind.toml")
+    assert f"muslin add wind {study} -o {between} && muslin add gravity-tilt {between} -o" in capsys.readouterr().out
+    step("diagnose", lambda s: Result({"verdict": "tied", "effects": ["wind", "gravity-tilt"], "further": ["hem"]}))
+    assert status("diagnose", str(study)) == 0
+    told = capsys.readouterr().out
+    assert f"muslin add wind {study} -o {between} && muslin add hem {between} -o" in told and "add gravity" not in told
+
+
 def test_a_missing_folder_is_told_before_anything_is_simulated(step: Callable[..., None], study: Path) -> None:
     ran: list[Study] = []
     step("diagnose", ran.append)

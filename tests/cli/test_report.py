@@ -133,6 +133,16 @@ def test_two_missing_effects_are_told_as_two(tmp_path: Path) -> None:
     assert "Air drag and viscous damping are missing from the model; with them, the" in page_of(study).text
 
 
+def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group = study.results("r+")["diagnose"]
+    tied = {"verdict": "tied", "effects": ["air-drag", "viscous-damping"], "further": ["wind"]}
+    group.attrs["result"] = {**group.attrs["result"], **tied}
+    text = page_of(study).text
+    assert "Whichever it is, wind is missing, too. With air drag and wind, the" in text
+    assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
+
+
 def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     study = make_study(tmp_path, "fit", "compare", "diagnose")
     page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))
