@@ -45,9 +45,10 @@ def diagnose(study: Study) -> Diagnosis:
         pair = BeforeAfter(work, started, (found.after.space, later))
         plain = found.first.plain
         joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
-        found = _past_chance(work, replace(found, after=joint.nearest))
+        found = replace(found, after=joint.nearest)
+        surely = _surely(work, found)
         count = work.simulations
-    result = _result(study, found, joint, pair, work, count, time.monotonic() - began)
+    result = _result(study, found, surely, joint, pair, work, count, time.monotonic() - began)
     result["told"] = told(study, result, effects)
     paragraphs = explain(result)
     with storage_errors(study.results_path):
@@ -68,14 +69,11 @@ def diagnose(study: Study) -> Diagnosis:
     return Diagnosis(result, tuple(paragraphs))
 
 
-def _past_chance(work: Work, found: Findings) -> Findings:
-    """Coefficients that are told of with what is known of them where chance moves the model, too."""
-    found = replace(found, after=work.past_chance(found.after)) if found.verdict == "named" else found
-    if found.verdict != "tied":
-        return found
-    e = found.first.evidence
-    candidates = tuple(work.past_chance(c) if c.name in found.effects else c for c in e.candidates)
-    return replace(found, first=replace(found.first, evidence=replace(e, candidates=candidates)))
+def _surely(work: Work, found: Findings) -> dict[str, Candidate]:
+    """The models whose coefficients are told, by effect, with what is known of them where chance moves them, too."""
+    if found.verdict == "named":
+        return dict.fromkeys(found.effects, work.past_chance(found.after))
+    return {n: work.past_chance(found.first.candidate(n)) for n in found.effects}
 
 
 def _fitted(study: Study) -> FloatArray:
@@ -116,7 +114,14 @@ def _rest(found: Findings, joint: Evidence, work: Work) -> str | None:
 
 
 def _result(
-    study: Study, found: Findings, joint: Evidence, pair: BeforeAfter, work: Work, count: int, seconds: float
+    study: Study,
+    found: Findings,
+    surely: dict[str, Candidate],
+    joint: Evidence,
+    pair: BeforeAfter,
+    work: Work,
+    count: int,
+    seconds: float,
 ) -> dict[str, Any]:
     first, after = found.first, found.after
     e = first.evidence
@@ -127,8 +132,7 @@ def _result(
     rows = []
     for c in sorted(e.candidates, key=lambda c: c.rank):
         # of effects that were named together, what they are together
-        named_together = found.verdict == "named" and c.name in found.effects
-        coefficients = after.coefficients_of(c.name) if named_together else c.coefficients
+        coefficients = surely.get(c.name, c).coefficients_of(c.name)
         rows.append(
             {
                 "name": c.name,

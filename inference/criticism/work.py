@@ -163,7 +163,9 @@ class Work:
 
     def past_chance(self, candidate: Candidate) -> Candidate:
         """With a covariance that holds where the model cannot be repeated, too."""
-        return replace(candidate, fit=seen_past_chance(self.objective(self._effects_of(candidate)), candidate.fit))
+        effects = self._effects_of(candidate)
+        seen = seen_past_chance(self.objective(effects), self._again(effects, candidate.fit))
+        return replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
         """The same point with residuals that are whitened as they are now."""
