@@ -102,13 +102,17 @@ def _with_another(work: Work, names: list[str], found: Findings) -> Findings | N
         return None
     second = stage.chosen
     pairs = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in found.effects[1:]}
-    best = min(pairs, key=lambda n: pairs[n].rss)
-    margin = MARGIN + SHARE_LEFT * stage.evidence.left(pairs[best])
-    near = [n for n in sorted(pairs, key=lambda n: pairs[n].rss) if pairs[n].rss - pairs[best].rss < margin]
+    order = sorted(pairs, key=lambda n: pairs[n].rss)
+    e, best, ahead = stage.evidence, order[0], pairs[order[0]]
+    margin = MARGIN + SHARE_LEFT * e.left(ahead)
+    # one that is behind where it was fitted, and ahead where it was not, is not ruled out
+    near = [
+        n for n in order
+        if e.behind(pairs[n], ahead) < margin or pairs[n].held_out_white <= ahead.held_out_white
+    ]  # fmt: skip
     if len(near) > 1:
-        after = work.judged(pairs[best])
-        return Findings("tied", tuple(near), first, stage, after, further=(second.name,))
-    named = Findings("named", (best, second.name), first, stage, work.judged(pairs[best]))
+        return Findings("tied", tuple(near), first, stage, ahead, further=(second.name,))
+    named = Findings("named", (best, second.name), first, stage, ahead)
     return _forward(work, names, _without_idle(work, named))
 
 
@@ -118,7 +122,7 @@ def _beside(work: Work, rival: Candidate, second: Candidate) -> Candidate:
     space, values = work.space(effects), dict(zip(second.space.names, second.fit.unit, strict=True))
     values |= dict(zip(rival.space.names, rival.fit.unit, strict=True))
     fit = work.polished(effects, np.array([values[n] for n in space.names]), MORE_EVALUATIONS)
-    return replace(second, space=space, base=len(rival.space), fit=fit)
+    return work.judged(replace(second, space=space, base=len(rival.space), fit=fit))
 
 
 def _without_idle(work: Work, found: Findings) -> Findings:
