@@ -138,7 +138,7 @@ def _alternatives(result: dict[str, Any]) -> str:
     about = named if named else [result["candidates"][0]["name"]]
     if verdict in ("no-misfit", "cannot-tell"):
         return ""
-    rivals = [c for c in result["candidates"] if c["name"] not in about]
+    rivals = [c for c in result["candidates"] if c["name"] not in (*about, *result["further"])]
     near = [c for c in rivals if c["explained"] > _WORTH_TELLING]
     if not near:
         visible = [c for c in rivals if c["objection"] != "invisible"]

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _in_part, _unchecked, _verdict
+from muslin.inference.criticism.sentences import _alternatives, _in_part, _unchecked, _verdict
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -69,3 +69,11 @@ def test_numbers_that_move_the_model_are_told_where_a_misfit_stays() -> None:
     assert numerics(known | moved | {"verdict": "named", "rest": "none"}) == told
     assert not numerics(known | moved | {"verdict": "named"})
     assert not numerics(known | {"numerics": {"step": 0.001}, "verdict": "none"})
+
+
+def test_what_is_missing_beside_others_is_not_told_as_ruled_out() -> None:
+    rows = [
+        {"name": n, "explained": 0.4, "objection": "little", "behind": 99.0} for n in ("wind", "tilt", "lag", "hem")
+    ]
+    told = _alternatives({"verdict": "tied", "effects": ["wind", "tilt"], "further": ["lag"], "candidates": rows})
+    assert told.startswith("Ruled out: hem (40 %") and "lag" not in told
