@@ -4,8 +4,6 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Sequence
-from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
@@ -25,16 +23,6 @@ def say(text: str) -> None:
 def command(*parts: object) -> str:
     """A command line that a shell takes as it is printed, whatever a path has in it."""
     return shlex.join(["muslin", *(str(p) for p in parts)])
-
-
-def add_commands(study: Path, effects: Sequence[str]) -> str:
-    """One command line that adds all ``effects``, each to a study of its own that the next one starts from."""
-    lines = []
-    for name in effects:
-        target = study.with_name(f"{study.stem}-with-{name}.toml")
-        lines.append(command("add", name, study, "-o", target))
-        study = target
-    return " && ".join(lines)
 
 
 def next_step(*commands: str, note: str = "") -> None:

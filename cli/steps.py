@@ -8,7 +8,8 @@ import typer
 from ..core.errors import InputError
 from ..core.registry import REGISTRY
 from ..core.study import Study
-from .console import ProgressView, add_commands, command, next_step, say
+from .adding import add_commands, with_effect
+from .console import ProgressView, command, next_step, say
 from .output import check_output, write_json
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
@@ -119,7 +120,7 @@ def add(
         raise InputError(f"name an effect and a study, or a law file and a study; got {effect!r} alone")
     source, what = (Path(effect), f"the law of {law}") if study is None else (study, effect)
     name = effect if law is None else "law"
-    target = output or source.with_name(f"{source.stem}-with-{name}.toml")
+    target = output or with_effect(source, name)
     if target.resolve() == source.resolve():
         raise InputError(f"{target} is the study itself; name another file with -o")
     check_output(target, force)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ...core.errors import MuslinError
 from ...core.study.objects import object_of
-from ..console import add_commands
+from ..adding import add_commands
 from .findings import Findings, number
 from .words import errors, length, sentence, words
 

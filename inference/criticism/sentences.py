@@ -5,7 +5,7 @@ from typing import Any
 from ...core.effect import Effect
 from ...core.study import Study
 from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable
-from .verdict import EXPLAINS
+from .verdict import EXPLAINS, MARGIN
 
 #: Candidates that explain at least this share are told one by one.
 _WORTH_TELLING = 0.2
@@ -162,8 +162,9 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
         return "what it leaves is neither noise nor what the numbers of the model make"
     if why == "held-out":
         return "motions that it was not fitted to get no better"
-    if len(result["effects"]) > 1:
-        return f"less than {result['effects'][0]} with {' and '.join(result['effects'][1:])} beside it"
+    beside = result["further"] if result["verdict"] == "tied" else result["effects"][1:]
+    if candidate["behind"] < MARGIN and beside:  # it was level by itself
+        return f"behind with {' and '.join(beside)} in the model"
     first = result["candidates"][0]["name"]
     return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
 

@@ -1,6 +1,7 @@
 """Diagnosis end to end on small studies, on both engines."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ from small import small_measurement, write_study
 
 from muslin.core.errors import InputError
 from muslin.core.study import Study
+from muslin.inference.criticism import work
 from muslin.inference.criticism.diagnose import Diagnosis
+from muslin.inference.polish import Objective, Polished
 from muslin.plugins.effects.air import AirDrag
 from muslin.plugins.effects.command import ActuatorLag
 
@@ -36,7 +39,16 @@ def check_schema(result: dict[str, object]) -> None:
 
 
 @pytest.mark.slow
-def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(tmp_path: Path) -> None:
+def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = list[Polished]()
+
+    def past_chance(objective: Objective, best: Polished) -> Polished:
+        told.append(replace(best, covariance=4.0 * best.covariance))  # as if chance had a hand in it
+        return told[-1]
+
+    monkeypatch.setattr(work, "seen_past_chance", past_chance)
     path = write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2)))
     study = Study.load(path)
     study.fit()
@@ -51,6 +63,11 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     assert study.step_results("diagnose").attrs["models"][0]["effects"] == ["air-drag"]
     drag = diagnosis.result["candidates"][0]["coefficients"]["drag_coefficient"]
     assert abs(drag["mean"] - 1.2) < 4 * drag["sd"] + 0.02
+    (best,) = told
+    names, covariance = study.step_results("diagnose").attrs["models"][0]["parameters"], best.covariance
+    known = AirDrag.coefficients[0].high * np.sqrt(covariance.diagonal())[names.index("air-drag.drag_coefficient")]
+    assert known <= drag["sd"] < 1.5 * known  # what is told is what is known past chance
+    monkeypatch.undo()
     assert diagnosis.result["error"]["after"] < 0.5 * diagnosis.result["error"]["before"]
     added = study.add("air-drag")
     added.fit()

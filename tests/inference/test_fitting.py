@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,8 @@ from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreE
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
 from muslin.core.study import Study
+from muslin.inference.polish import Objective, Polished
+from muslin.inference.sequential import fitting
 from muslin.inference.sequential.only_one import only_one
 
 pytest.importorskip("mujoco")
@@ -32,6 +35,19 @@ def test_a_right_model_is_fitted_within_its_uncertainty(small_study: Study) -> N
     comparison = small_study.compare()
     assert comparison.adequate, comparison.text()
     assert all(row.rmse < row.baseline for row in comparison.rows)
+
+
+def test_a_fit_tells_what_is_known_past_chance(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = list[Polished]()
+
+    def past_chance(objective: Objective, best: Polished) -> Polished:
+        told.append(replace(best, covariance=4.0 * best.covariance))  # as if chance had a hand in it
+        return told[-1]
+
+    monkeypatch.setattr(fitting, "seen_past_chance", past_chance)
+    small_study.fit()
+    kept = read(small_study.step_results("fit"), "estimate_covariance")
+    np.testing.assert_allclose(kept, told[-1].covariance)
 
 
 def test_a_finished_fit_is_returned_and_not_run_again(small_study: Study) -> None:

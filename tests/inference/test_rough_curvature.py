@@ -1,14 +1,20 @@
 """What is said to be known of parameters where the residuals answer to next to nothing, against the truth."""
 
+from pathlib import Path
+
 import numpy as np
+import pytest
+from buckling import buckling_study
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.core.study import SimulationPool
 from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, polish
 from muslin.inference.residuals import Offsets
 from muslin.inference.rough_curvature import seen_past_chance
+from muslin.inference.roughness import roughness
 
 COUNT, TRUTH = 60, np.array([0.35, 0.6])
 
@@ -29,8 +35,10 @@ class Rough(Objective):
         self.seed, self.size = seed, size
         self.matrix, self.error = rng.normal(size=(COUNT, 2)) * 5, rng.normal(size=COUNT)
 
+    wall = 1.0
+
     def many(self, units: FloatArray) -> list[FloatArray | None]:
-        return [self.discrepancy.whitened("all", self.raw(u)) for u in units]
+        return [self.discrepancy.whitened("all", self.raw(u)) if u[0] <= self.wall else None for u in units]
 
     def raw(self, unit: FloatArray) -> FloatArray:
         chance = np.random.default_rng([self.seed, *unit.view(np.uint64).tolist()]).normal(size=COUNT)
@@ -66,3 +74,25 @@ def test_no_less_is_known_than_the_prior_says() -> None:
     objective.matrix *= 1e-3
     best = seen_past_chance(objective, polish(objective, np.array([0.5, 0.5])))
     assert (np.diag(best.covariance) <= 1.0 / 12.0 + 1e-12).all()
+
+
+def test_nothing_changes_where_neighbours_cannot_be_simulated() -> None:
+    objective = Rough(5, 0.4)
+    best = polish(objective, np.array([0.5, 0.5]))
+    objective.wall = best.unit[0] + 1e-6
+    assert seen_past_chance(objective, best) is best
+
+
+def test_a_rope_that_buckles_is_not_told_too_surely(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    problem, noise = buckling_study(tmp_path).problem, Noise(0.001, 0.0, "test", "m", 0.01)
+    truth, start = np.full(len(problem.space), 0.5), np.full(len(problem.space), 0.45)
+    with SimulationPool(problem, 0) as pool:
+        rough = roughness(pool, problem.space, truth, ("down",))
+        discrepancy = rough.discrepancy(problem.recordings, noise, Offsets())
+        objective = Objective(pool, problem.space, ("down",), noise, Offsets(), discrepancy=discrepancy)
+        near = polish(objective, start)
+        seen = seen_past_chance(objective, near)
+    away = np.abs(near.unit - truth)
+    assert (away > 10 * np.sqrt(np.diag(near.covariance))).any()
+    assert (away < 3 * np.sqrt(np.diag(seen.covariance))).all()

@@ -77,3 +77,17 @@ def test_what_is_missing_beside_others_is_not_told_as_ruled_out() -> None:
     ]
     told = _alternatives({"verdict": "tied", "effects": ["wind", "tilt"], "further": ["lag"], "candidates": rows})
     assert told.startswith("Ruled out: hem (40 %") and "lag" not in told
+
+
+def test_why_a_candidate_that_passes_by_itself_is_not_named() -> None:
+    def told(behind: float, **result: Any) -> str:
+        rival = {"name": "wind", "explained": 0.9, "objection": None, "behind": behind}
+        rows = [rival | {"name": "tilt", "behind": 0.0}, rival]
+        return _alternatives({"effects": ["tilt"], "verdict": "named", "further": [], "candidates": rows} | result)
+
+    assert told(42.0) == "Ruled out: wind (90 %: 42 behind tilt in -2 log likelihood)."
+    assert told(42.0, effects=["tilt", "drag"]) == told(42.0)
+    assert told(3.0, effects=["tilt", "drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
+    tied = {"verdict": "tied", "effects": ["tilt", "lag"]}
+    assert told(42.0, **tied) == told(42.0)
+    assert told(3.0, **tied, further=["drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
