@@ -77,7 +77,8 @@ def _shown_effect(result: Table | None) -> str:
     if not result:
         return ""
     if result.get("effects"):
-        return ", ".join(result["effects"]) if result.get("verdict") == "named" else str(result["effects"][0])
+        tied = [result["effects"][0], *(result.get("further") or [])]
+        return ", ".join(result["effects"] if result.get("verdict") == "named" else tied)
     candidates = result.get("candidates") or []
     return str(candidates[0]["name"]) if candidates and result.get("verdict") != "no-misfit" else ""
 

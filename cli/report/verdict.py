@@ -82,15 +82,16 @@ def _diagnosed(found: Findings) -> Verdict:
             drop = f"the {e['on']} error is {before} ({floor})"
         add = "" if found.after_inferred else add_commands(Path(file), effects)
         verb, it = ("are", "them") if len(effects) > 1 else ("is", "it")
-        told = _cap(f"{named} {verb} missing from the model; with {it}, {drop}.")
+        within = _after(found, effects)
+        told = _cap(f"{named} {verb} missing from the model; with {it if within == named else within}, {drop}.")
         return Verdict("named", "good", told, detail, add)
     if result["verdict"] == "tied":
         rivals = " or ".join(words(n) for n in effects)
         beside = [str(n) for n in result.get("further") or []]
         drop = f"The {e['on']} error is {before}, {floor}."
         if effects and number(e["after"]) is not None:
-            added = " and ".join(words(n) for n in [effects[0], *beside])
-            drop = f"With {added}, the {e['on']} error falls from {before} to {after} ({floor})."
+            within = _after(found, [effects[0], *beside])
+            drop = f"With {within}, the {e['on']} error falls from {before} to {after} ({floor})."
         add = "" if found.after_inferred or not effects else add_commands(Path(file), [effects[0], *beside])
         missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
         if beside:
@@ -105,6 +106,11 @@ def _diagnosed(found: Findings) -> Verdict:
         text = f"The error is {before} at {floor}; the budget ended before what promises most was refitted."
     tone = {"none": "bad", "no-misfit": "good"}.get(str(result["verdict"]), "open")
     return Verdict(words(str(result["verdict"])), tone, text, detail)
+
+
+def _after(found: Findings, named: list[str]) -> str:
+    """What the model has whose error is told as after: the added study's effects, or those of the diagnosis."""
+    return " and ".join(words(n) for n in (found.after_name.split(", ") if found.after_inferred else named))
 
 
 def _cap(text: str) -> str:

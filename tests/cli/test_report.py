@@ -143,6 +143,16 @@ def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
     assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
 
 
+@pytest.mark.parametrize("verdict", ["named", "tied"])
+def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tmp_path: Path, verdict: str) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group, named = study.results("r+")["diagnose"], verdict == "named"
+    both = {"effects": ["air-drag", "wind"]} if named else {"effects": ["air-drag", "hem"], "further": ["wind"]}
+    group.attrs["result"] = {**group.attrs["result"], "verdict": verdict, **both}
+    text = page_of(study, make_study(tmp_path, "fit", "compare", drag=True)).text
+    assert "ith air drag, the" in text and "air drag and wind, the" not in text and "with them" not in text
+
+
 def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     study = make_study(tmp_path, "fit", "compare", "diagnose")
     page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))
