@@ -25,7 +25,8 @@ class Look:
         name: of the effect.
         space: parameters and coefficients.
         start: the plain fit with every coefficient zero ``(D,)``.
-        jacobian: of the white residuals ``(N, D)``.
+        white: residuals there ``(N,)``.
+        jacobian: of them ``(N, D)``.
         at: where the linear model of the residuals has its least square inside the cube ``(D,)``.
         rss: that square [noise variances].
         step: how far the coefficient that was moved most was moved.
@@ -35,6 +36,7 @@ class Look:
     name: str
     space: ParameterSpace
     start: FloatArray
+    white: FloatArray
     jacobian: FloatArray
     at: FloatArray
     rss: float
@@ -92,7 +94,7 @@ def look_at(name: str, objective: Objective, plain: Polished) -> Look:
     jacobian = np.hstack([plain.jacobian, columns])
     at, rss = least_square(start, plain.white, jacobian)
     reach = float(np.max(np.linalg.norm(columns * steps, axis=0)) / np.sqrt(plain.rss))
-    return Look(name, space, start, jacobian, at, rss, float(np.abs(steps).max()), reach)
+    return Look(name, space, start, plain.white, jacobian, at, rss, float(np.abs(steps).max()), reach)
 
 
 def least_square(unit: FloatArray, white: FloatArray, jacobian: FloatArray) -> tuple[FloatArray, float]:

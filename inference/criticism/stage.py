@@ -1,6 +1,8 @@
 """Every candidate beside the model so far: looked at, screened, polished, and what the evidence says."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -53,8 +55,17 @@ class Stage:
         return self.candidate(self.decision.effects[0])
 
 
-def run_stage(work: Work, effects: tuple[str, ...], names: list[str], start: FloatArray) -> Stage:
-    """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``."""
+def run_stage(
+    work: Work,
+    effects: tuple[str, ...],
+    names: list[str],
+    start: FloatArray,
+    hints: Mapping[str, FloatArray] = MappingProxyType({}),
+) -> Stage:
+    """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``.
+
+    Candidates are looked at where ``hints`` say, too: points ``(K, D)`` of the unit cube, by name.
+    """
     work.study.progress("refitting the model as it is", 0, 0)
     work.see_numerics(effects, start)
     plain = work.polished(effects, start, PLAIN_EVALUATIONS)
@@ -65,7 +76,7 @@ def run_stage(work: Work, effects: tuple[str, ...], names: list[str], start: Flo
     candidates = [_seen_only(look, plain) for look in looks.values()]
     evidence = work.evidence(effects, plain, candidates)
     if has_misfit(evidence) or any(_promises(look, plain, len(names)) for look in looks.values()):
-        tournament = _Tournament(work, effects, plain, looks)
+        tournament = _Tournament(work, effects, plain, looks, hints)
         candidates = tournament.run()
         best = min(candidates, key=lambda c: c.rss)
         if best.rss < plain.rss:
@@ -90,8 +101,15 @@ def _promises(look: Look, plain: Polished, tried: int) -> bool:
 class _Tournament:
     """Rollouts for those candidates that may win."""
 
-    def __init__(self, work: Work, effects: tuple[str, ...], plain: Polished, looks: dict[str, Look]) -> None:
-        self.work, self.effects, self.plain, self.looks = work, effects, plain, looks
+    def __init__(
+        self,
+        work: Work,
+        effects: tuple[str, ...],
+        plain: Polished,
+        looks: dict[str, Look],
+        hints: Mapping[str, FloatArray],
+    ) -> None:
+        self.work, self.effects, self.plain, self.looks, self.hints = work, effects, plain, looks, hints
         self.points = work.study.config.diagnose.draws
         self.until = work.count + LEADERS_SHARE * (work.limit - work.count)
         seed = work.study.config.study.seed
@@ -105,7 +123,7 @@ class _Tournament:
         for k, name in enumerate(acting):
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
             look = self.looks[name]
-            there = self.moved(found[name], look.at[None])
+            there = self.moved(found[name], np.vstack([look.at, *self.hints.get(name, ())]))
             off = look.reach >= FAR_OFF  # then points all over the prior are wrong by as much
             found[name] = self.rescaled(there, look) if off else self.screened(there, FEW_POINTS)
         promise = {name: self.looks[name].rss for name in acting}

@@ -6,15 +6,16 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from .candidate import Candidate
+from .pairs import Pair, away, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import MARGIN, SHARE_LEFT, SIGNIFICANT, Decision, Verdict
+from .verdict import MARGIN, SHARE_LEFT, Decision, Verdict
 from .work import Work
 
 #: Effects that one diagnosis may name.
 MOST_EFFECTS = 3
-#: Where no effect alone is enough, pairs are tried with this many that explain at least this share of the misfit.
-LEADS, LEADING = 2, 0.2
+#: Beside the lead of a pair as many candidates are tried as second effects, those that promise most.
+PARTNERS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,23 +46,27 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     """Find what is missing among candidates ``names``, the plain model's fit starting at ``start`` (unit cube)."""
     first = settled(work, run_stage(work, (), names, start))
     verdict = first.decision.verdict
-    if verdict == "none":
-        return _pair(work, names, first) or Findings("none", (), first, first, _nearest(first))
-    if verdict == "tied":
-        tied = Findings("tied", first.decision.effects, first, first, first.chosen)
-        return _with_another(work, names, tied) or tied
-    if verdict != "named":
+    if verdict in ("no-misfit", "cannot-tell"):
         return Findings(verdict, (), first, first, _nearest(first))
-    return _forward(work, names, Findings("named", first.decision.effects, first, first, first.chosen))
+    left = first.evidence.left(first.evidence.nearest) > 0.0
+    pairs = promising_pairs(work, first) if left else []
+    if (verdict == "none" or _outdone(first, pairs)) and (pair := _pair(work, names, first, pairs)):
+        return pair
+    if verdict == "none":
+        return Findings("none", (), first, first, _nearest(first))
+    found = Findings(verdict, first.decision.effects, first, first, first.chosen)
+    if verdict == "tied":
+        return _with_another(work, names, found, pairs) or found
+    return _forward(work, names, found, pairs)
 
 
-def _forward(work: Work, names: list[str], found: Findings) -> Findings:
+def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings:
     """Add effects as long as one is named; whether there is a misfit left to look into, each stage says itself."""
     while len(found.effects) < MOST_EFFECTS and work.may_go_on():
         rest = [n for n in names if n not in found.effects]
         if not rest:
             break
-        stage = settled(work, run_stage(work, found.effects, rest, found.after.fit.unit))
+        stage = _stage(work, found.first, found.effects, rest, found.after.fit.unit, pairs)
         # the same model, fitted to the end, and its numerics looked at where it fits
         after = work.judged(replace(found.after, fit=stage.plain))
         found = replace(found, after=after, rest=stage.decision)
@@ -76,44 +81,77 @@ def _forward(work: Work, names: list[str], found: Findings) -> Findings:
     return found
 
 
-def _pair(work: Work, names: list[str], first: Stage) -> Findings | None:
+def _stage(
+    work: Work, first: Stage, effects: tuple[str, ...], names: list[str], start: FloatArray, pairs: list[Pair]
+) -> Stage:
+    """A later stage. Where candidates were alone, and in pairs, is looked at: of thresholds no derivative tells."""
+    at, hints = dict(zip(work.space(effects).names, start, strict=True)), {}
+    for name in names:
+        alone = first.candidate(name)
+        points = [p.values for p in pairs if set(p.names) == {*effects, name}]
+        if away(first, alone):
+            points.append(at | dict(zip(alone.space.names[alone.base :], alone.fit.unit[alone.base :], strict=True)))
+        order = work.space((*effects, name)).names
+        hints[name] = np.array([[point[n] for n in order] for point in points]).reshape(-1, len(order))
+    return settled(work, run_stage(work, effects, names, start, hints))
+
+
+def _outdone(first: Stage, pairs: list[Pair]) -> bool:
+    """Are two other effects together so much better than what is named that it does not take part in the answer?
+
+    One may stand in for two: a camera that is off by some millimetres for a grasp that gives and a base that leans.
+    """
+    named = set(first.decision.effects)
+    if not pairs or named & set(pairs[0].names):
+        return False
+    e, best = first.evidence, pairs[0].both
+    rivals = [first.chosen, *(p.both for p in pairs if named & set(p.names))]
+    return min(e.behind(rival, best) for rival in rivals) > MARGIN + SHARE_LEFT * e.left(best)
+
+
+def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Findings | None:
     """Two effects of like strength hide each other: with one of them in the model, is another one named?"""
-    e = first.evidence
-    leads = [c for c in sorted(e.candidates, key=lambda c: c.rank) if e.explained(c) > LEADING and e.z(c) > SIGNIFICANT]
-    for lead in leads[:LEADS]:
-        rest = [n for n in names if n != lead.name]
-        if not work.may_go_on() or not rest:
-            return None
-        stage = settled(work, run_stage(work, (lead.name,), rest, lead.fit.unit))
-        if stage.decision.verdict == "named" and work.jointly(stage.chosen, first.plain).accounted(stage.chosen):
-            pair = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
-            return _forward(work, names, _without_idle(work, pair))
-    return None
-
-
-def _with_another(work: Work, names: list[str], found: Findings) -> Findings | None:
-    """A second effect beside those that are tied; with it in the model they may be told apart."""
-    first, lead = found.first, found.after
-    others = [n for n in names if n not in found.effects]
-    if first.evidence.left(lead) == 0.0 or not others or not work.may_go_on():
+    if not pairs or not work.may_go_on():
         return None
-    stage = settled(work, run_stage(work, (lead.name,), others, lead.fit.unit))
+    lead = pairs[0].lead
+    rest = [
+        n
+        for n in names
+        if n in partners(first, lead.name, PARTNERS) or any({n, lead.name} == {*p.names} for p in pairs)
+    ]
+    stage = _stage(work, first, (lead.name,), rest, lead.fit.unit, pairs)
+    if stage.decision.verdict != "named" or not work.jointly(stage.chosen, first.plain).accounted(stage.chosen):
+        return None
+    named = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
+    return _forward(work, names, _without_idle(work, named), pairs)
+
+
+def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings | None:
+    """A second effect beside those that are tied; with it in the model they may be told apart."""
+    first = found.first
+    others = [n for n in names if n not in found.effects]
+    if first.evidence.left(found.after) == 0.0 or not others or not work.may_go_on():
+        return None
+    best = [n for n in (pairs[0].names if pairs else ()) if n in found.effects]
+    lead = first.candidate(best[0]) if best else found.after
+    stage = _stage(work, first, (lead.name,), others, lead.fit.unit, pairs)
     if stage.decision.verdict != "named":
         return None
     second = stage.chosen
-    pairs = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in found.effects[1:]}
-    order = sorted(pairs, key=lambda n: pairs[n].rss)
-    e, best, ahead = stage.evidence, order[0], pairs[order[0]]
+    rivals = [n for n in found.effects if n != lead.name]
+    beside = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in rivals}
+    order = sorted(beside, key=lambda n: beside[n].rss)
+    e, ahead = stage.evidence, beside[order[0]]
     margin = MARGIN + SHARE_LEFT * e.left(ahead)
     # one that is behind where it was fitted, and ahead where it was not, is not ruled out
     near = [
         n for n in order
-        if e.behind(pairs[n], ahead) < margin or pairs[n].held_out_white <= ahead.held_out_white
+        if e.behind(beside[n], ahead) < margin or beside[n].held_out_white <= ahead.held_out_white
     ]  # fmt: skip
     if len(near) > 1:
         return Findings("tied", tuple(near), first, stage, ahead, further=(second.name,))
-    named = Findings("named", (best, second.name), first, stage, ahead)
-    return _forward(work, names, _without_idle(work, named))
+    named = Findings("named", (order[0], second.name), first, stage, ahead)
+    return _forward(work, names, _without_idle(work, named), pairs)
 
 
 def _beside(work: Work, rival: Candidate, second: Candidate) -> Candidate:

@@ -23,7 +23,7 @@ from .verdict import Evidence
 #: Share of the simulations that the search leaves: for what it has begun when they end, and for telling what it found.
 RESERVED = 0.15
 #: Simulations of a diagnosis for every recording that is fitted, and at least; ropes are quick to simulate.
-A_RECORDING, A_RECORDING_OF_A_ROPE, AT_LEAST = 500, 1000, 1000
+A_RECORDING, A_RECORDING_OF_A_ROPE, AT_LEAST = 440, 1250, 880
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 

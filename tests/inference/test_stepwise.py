@@ -1,6 +1,8 @@
-"""Effects that are tied may be told apart once a second effect is in the model."""
+"""A second effect: beside tied ones, which it may tell apart, and in pairs that no effect alone stands for."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -11,10 +13,15 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism import stepwise
 from muslin.inference.criticism.candidate import Candidate
 from muslin.inference.criticism.caveats import further
+from muslin.inference.criticism.linear import Look
+from muslin.inference.criticism.pairs import Pair
 from muslin.inference.criticism.stage import Stage
 from muslin.inference.criticism.stepwise import Findings, find
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.polish import Polished
+
+Hints = Mapping[str, FloatArray]
+NO_HINTS: Hints = MappingProxyType({})
 
 
 class Bench:
@@ -46,12 +53,12 @@ def found(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tu
     left = {("tilt",): alone, ("wind",): alone + 1.0, ("tilt", "drag"): with_tilt, ("wind", "drag"): with_wind}
     bench, stages = Bench(left | {("drag",): 8 * COUNT}, request.param[3]), list[tuple[str, ...]]()
 
-    def run_stage(work: Bench, effects: tuple[str, ...], names: list[str], start: FloatArray) -> Stage:
+    def run_stage(
+        work: Bench, effects: tuple[str, ...], names: list[str], start: FloatArray, hints: Hints = NO_HINTS
+    ) -> Stage:
         stages.append(effects)
         if not effects:
-            each = {"tilt": alone, "wind": alone + 1.0, "drag": 8 * COUNT}
-            e = evidence(9 * COUNT, *(candidate(n, rss) for n, rss in each.items()))
-            return Stage(effects, candidate("x", 9 * COUNT).fit, {}, e, decide(e))
+            return first_stage({"tilt": alone, "wind": alone + 1.0, "drag": 8 * COUNT})
         if len(effects) > 1:  # nothing more is missing
             e = evidence(with_tilt, candidate("mass", with_tilt))
             return Stage(effects, bench.polished(("tilt", "drag"), start, 1), {}, e, Decision("no-misfit", ()))
@@ -64,7 +71,22 @@ def found(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tu
 
     monkeypatch.setattr(stepwise, "run_stage", run_stage)
     monkeypatch.setattr(stepwise, "settled", lambda work, stage: stage)
+    monkeypatch.setattr(stepwise, "promising_pairs", lambda work, stage: [])
     return find(bench, ["tilt", "wind", "drag"], np.full(1, 0.5)), stages  # type: ignore[arg-type]
+
+
+def first_stage(left: dict[str, float]) -> Stage:
+    """Of candidates that leave so much of a misfit of nine times the noise."""
+    candidates = {n: candidate(n, rss) for n, rss in left.items()}
+    looks = {n: look(c) for n, c in candidates.items()}
+    e = evidence(9 * COUNT, *candidates.values())
+    return Stage((), candidate("x", 9 * COUNT).fit, looks, e, decide(e))
+
+
+def look(c: Candidate) -> Look:
+    """Nothing moves; the coefficient is at zero."""
+    start = np.array([0.5, 0.0])
+    return Look(c.name, c.space, start, c.fit.white, np.zeros((len(c.fit.white), 2)), start, c.rss, 0.1, 1.0)
 
 
 def outcome(alone: float, with_tilt: float, with_wind: float, held_out: float = 2.0) -> pytest.MarkDecorator:
@@ -106,3 +128,64 @@ def test_no_other_is_looked_for_where_nothing_is_left(found: tuple[Findings, lis
 def test_what_is_missing_beside_either_is_told() -> None:
     said = further({"verdict": "tied", "effects": ["tilt", "wind"], "further": ["drag"]})
     assert "whichever of tilt, wind it is: drag" in said
+
+
+@pytest.fixture
+def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tuple[Findings, Hints]:
+    """What is found where camera, grasp and tilt leave so much alone, and grasp and tilt together a number; hints."""
+    alone, together = {n: COUNT * x for n, x in request.param[0].items()}, COUNT * request.param[1]
+    seen: dict[str, FloatArray] = {}
+    bench = Bench({("tilt",): 6 * COUNT, ("grasp",): 5 * COUNT}, 1.0)
+    first = first_stage(alone)
+
+    def both() -> Candidate:
+        fit = bench.polished(("x", "y"), np.array([0.5, 0.3, 0.7]), 1)
+        return Candidate("tilt", bench.space(("grasp", "tilt")), 2, fit, {"other": 0.003}, 1.0, refitted=True)
+
+    bench.left["x", "y"] = together
+
+    def run_stage(
+        work: Bench, effects: tuple[str, ...], names: list[str], start: FloatArray, hints: Hints = NO_HINTS
+    ) -> Stage:
+        if not effects:
+            return first
+        if effects != ("grasp",):
+            e = evidence(together, candidate("slip", together))
+            return Stage(effects, candidate("x", together).fit, {}, e, Decision("no-misfit", ()))
+        seen.update(hints)
+        e = evidence(alone["grasp"], both())
+        return Stage(effects, first.candidate("grasp").fit, {}, e, Decision("named", ("tilt",)))
+
+    monkeypatch.setattr(stepwise, "run_stage", run_stage)
+    monkeypatch.setattr(stepwise, "settled", lambda work, stage: stage)
+    pair = Pair(first.candidate("grasp"), both())
+    monkeypatch.setattr(stepwise, "promising_pairs", lambda work, stage: [pair])
+    joint = evidence(9 * COUNT, both())
+    bench.jointly = lambda *_: joint  # type: ignore[attr-defined]
+    return find(bench, ["camera", "grasp", "tilt"], np.full(1, 0.5)), seen  # type: ignore[arg-type]
+
+
+NEITHER = {"camera": 7.0, "grasp": 5.5, "tilt": 6.0}
+CAMERA = {"camera": 2.5, "grasp": 5.5, "tilt": 6.0}  # named: it leaves less than a fifth of the misfit
+
+
+@pytest.mark.parametrize("paired", [(NEITHER, 1.0), (CAMERA, 1.0)], indirect=True)
+def test_a_pair_is_named_where_none_of_it_is_alone_or_another_stands_in_for_it(
+    paired: tuple[Findings, Hints],
+) -> None:
+    assert (paired[0].verdict, paired[0].effects) == ("named", ("grasp", "tilt"))
+
+
+@pytest.mark.parametrize("paired", [(NEITHER, 4.5)], indirect=True)
+def test_a_pair_that_leaves_much_is_not_named(paired: tuple[Findings, Hints]) -> None:
+    assert (paired[0].verdict, paired[0].effects) == ("none", ())
+
+
+@pytest.mark.parametrize("paired", [(CAMERA, 2.0)], indirect=True)
+def test_a_pair_that_is_little_ahead_of_what_is_named_does_not_replace_it(paired: tuple[Findings, Hints]) -> None:
+    assert (paired[0].verdict, paired[0].effects) == ("named", ("camera",))
+
+
+@pytest.mark.parametrize("paired", [(NEITHER, 1.0)], indirect=True)
+def test_second_effects_are_looked_at_where_they_were_in_a_pair_and_alone(paired: tuple[Findings, Hints]) -> None:
+    assert paired[1]["tilt"] == pytest.approx(np.array([[0.5, 0.3, 0.7], [0.5, 0.5, 0.5]]))
