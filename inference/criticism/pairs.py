@@ -15,7 +15,7 @@ from .work import Work
 
 #: A candidate leads if alone it explains at least this share of the misfit; so many leaders are paired with each other,
 LEADING, LEADERS = 0.2, 4
-#: so many pairs more are tried that promise most in a linear model, and the first leader with all that gain anything.
+#: and so many pairs more are tried that promise most in a linear model.
 PROMISING = 4
 #: Pairs that are looked at closer, and evaluations of each.
 CLOSER, CLOSER_EVALUATIONS = 3, 8
@@ -91,14 +91,7 @@ def _chosen(stage: Stage) -> list[tuple[Candidate, Candidate]]:
     pairs = list(combinations(leaders, 2))
     others = [(a, b) for a, b in combinations(order, 2) if a in leaders and b not in leaders]
     promised = {pair: _promise([stage.looks[c.name] for c in pair])[1] for pair in others}
-    likely = sorted(others, key=promised.__getitem__)
-    started = [pair for pair in likely[PROMISING:] if pair[0] is order[0] and away(stage, pair[1])]
-    return pairs + likely[:PROMISING] + started
-
-
-def away(stage: Stage, c: Candidate) -> bool:
-    """Did a candidate alone do better with than without its effect?"""
-    return not np.array_equal(c.fit.unit[c.base :], stage.looks[c.name].start[c.base :])
+    return pairs + sorted(others, key=promised.__getitem__)[:PROMISING]
 
 
 def _promise(looks: Sequence[Look]) -> tuple[FloatArray, float]:

@@ -64,7 +64,7 @@ def run_stage(
 ) -> Stage:
     """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``.
 
-    Candidates are looked at where ``hints`` say, too: points ``(K, D)`` of the unit cube, by name.
+    Candidates are tried from ``hints``, too, points ``(K, D)`` of the unit cube, by name, whatever these leave.
     """
     work.study.progress("refitting the model as it is", 0, 0)
     work.see_numerics(effects, start)
@@ -123,9 +123,12 @@ class _Tournament:
         for k, name in enumerate(acting):
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
             look = self.looks[name]
-            there = self.moved(found[name], np.vstack([look.at, *self.hints.get(name, ())]))
+            there = self.moved(found[name], look.at[None])
             off = look.reach >= FAR_OFF  # then points all over the prior are wrong by as much
             found[name] = self.rescaled(there, look) if off else self.screened(there, FEW_POINTS)
+        for name in (n for n in acting if len(self.hints.get(n, ()))):
+            self.work.study.progress(f"trying {name}", 0, 0)
+            found[name] = self.from_hints(found[name], self.hints[name])
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             self.work.study.progress(f"trying {name}", 0, 0)
@@ -177,6 +180,17 @@ class _Tournament:
         if not self.effects:
             starts = np.vstack([starts, self.work.starts])
         return self.moved(candidate, screening_points(candidate.space, base, starts, count, self.rng[candidate.name]))
+
+    def from_hints(self, candidate: Candidate, points: FloatArray) -> Candidate:
+        """The better of the candidate and of a short approach from the best of ``points (K, D)``."""
+        if not self.work.may_go_on(self.until):
+            return candidate
+        best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
+        if not best:
+            return candidate
+        there = self.looks[candidate.name].as_fit(self.plain, *best[0])
+        hinted = self.approached(replace(candidate, fit=there, approached=False), FIRST_EVALUATIONS)
+        return min(candidate, hinted, key=lambda c: c.rss)
 
     def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
         if not self.work.may_go_on(self.until):

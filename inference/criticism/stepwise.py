@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from .candidate import Candidate
-from .pairs import Pair, away, partners, promising_pairs
+from .pairs import Pair, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
 from .verdict import MARGIN, SHARE_LEFT, Decision, Verdict
@@ -84,12 +84,12 @@ def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -
 def _stage(
     work: Work, first: Stage, effects: tuple[str, ...], names: list[str], start: FloatArray, pairs: list[Pair]
 ) -> Stage:
-    """A later stage. Where candidates were alone, and in pairs, is looked at: of thresholds no derivative tells."""
+    """A later stage. Candidates start from where they were alone and in pairs: of thresholds no derivative tells."""
     at, hints = dict(zip(work.space(effects).names, start, strict=True)), {}
     for name in names:
-        alone = first.candidate(name)
+        alone, look = first.candidate(name), first.looks[name]
         points = [p.values for p in pairs if set(p.names) == {*effects, name}]
-        if away(first, alone):
+        if not np.array_equal(alone.fit.unit[alone.base :], look.start[look.base :]):
             points.append(at | dict(zip(alone.space.names[alone.base :], alone.fit.unit[alone.base :], strict=True)))
         order = work.space((*effects, name)).names
         hints[name] = np.array([[point[n] for n in order] for point in points]).reshape(-1, len(order))

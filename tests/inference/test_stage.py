@@ -1,5 +1,6 @@
 """How a diagnosis spends its simulations, and what it says of a misfit that stays."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,28 +48,51 @@ def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pyte
     assert search.simulations == 400  # ... wherever they are told of
 
 
-def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
+def bench(polished: Callable[..., Polished]) -> tuple[SimpleNamespace, _Tournament]:
+    """Rollouts that run out, and a tournament of one candidate, whose fits are given."""
     drag = candidate("drag", 2 * COUNT)
     plain = Polished(np.array([0.5]), drag.fit.white, np.ones((len(drag.fit.white), 1)), np.eye(1), COUNT)
     start = np.array([0.5, 0.0])
     jacobian = np.tile([1.0, 0.5], (len(plain.white), 1))
     look = Look("drag", drag.space, start, plain.white, jacobian, start, plain.rss, 0.1, 1.0)
+    config = SimpleNamespace(diagnose=SimpleNamespace(draws=4), study=SimpleNamespace(seed=1))
+    work = SimpleNamespace(
+        study=SimpleNamespace(config=config, progress=lambda *_: None), starts=np.full((2, 1), 0.5),
+        count=0, limit=1000, cut_short=False, polished=polished, roughly_polished=polished,
+    )  # fmt: skip
+    work.may_go_on = lambda until=np.inf: Work.may_go_on(work, until)  # type: ignore[arg-type]
+    return work, _Tournament(work, (), plain, {"drag": look}, {})  # type: ignore[arg-type]
+
+
+def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
     refitted = []
 
     def polished(effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
         refitted.append(effects)
         return candidate("drag", COUNT).fit
 
-    config = SimpleNamespace(diagnose=SimpleNamespace(draws=4), study=SimpleNamespace(seed=1))
-    bench = SimpleNamespace(
-        study=SimpleNamespace(config=config, progress=lambda *_: None), starts=np.full((2, 1), 0.5),
-        count=0, limit=1000, cut_short=False, polished=polished,
-    )  # fmt: skip
-    bench.may_go_on = lambda until=np.inf: Work.may_go_on(bench, until)  # type: ignore[arg-type]
-    tournament = _Tournament(bench, (), plain, {"drag": look}, {})  # type: ignore[arg-type]
-    bench.count = 800  # most of it went before anything could be refitted
+    work, tournament = bench(polished)
+    work.count = 800  # most of it went before anything could be refitted
     (found,) = tournament.run()
     assert refitted == [("drag",)] and found.refitted and found.rss == pytest.approx(COUNT)
+
+
+@pytest.mark.parametrize(("from_there", "reached"), [(1.0, 1.0), (3.0, 2.0)])
+def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_there: float, reached: float) -> None:
+    starts: list[FloatArray] = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
+        starts.append(unit)
+        return candidate("drag", from_there * COUNT).fit
+
+    work, tournament = bench(polished)
+    white = {0.2: np.full(int(COUNT), 3.0), 0.8: np.full(int(COUNT), 2.0)}
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [white[p[1]] for p in points])
+    hints = np.array([[0.5, 0.2], [0.5, 0.8]])
+    assert tournament.from_hints(candidate("drag", 2 * COUNT), hints).rss == pytest.approx(reached * COUNT)
+    assert starts == [pytest.approx(hints[1])]
+    work.count = work.limit
+    assert tournament.from_hints(candidate("drag", 2 * COUNT), hints).rss == pytest.approx(2 * COUNT)
 
 
 @pytest.mark.parametrize(
