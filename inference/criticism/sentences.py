@@ -54,12 +54,12 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
     rows = {c["name"]: c for c in result["candidates"]}
     if verdict == "named":
         symptoms = " and ".join(effects[n].symptom for n in named)
-        together = " and ".join(named)
+        together, them = " and ".join(named), "it" if len(named) == 1 else "them"
         return (
             f"Missing: {together}. The object {symptoms}; {together} "
             f"{'explains' if len(named) == 1 else 'together explain'} {100 * result['evidence']['explained']:.0f} % of "
-            f"the excess misfit, {'; '.join(_coefficients(rows[n]) for n in named)}; {fall}, {noise}. Without it the "
-            f"model is {ratio:.1f} times the noise off on the fitted recordings, with it "
+            f"the excess misfit, {'; '.join(_coefficients(rows[n]) for n in named)}; {fall}, {noise}. Without {them} "
+            f"the model is {ratio:.1f} times the noise off on the fitted recordings, with {them} "
             f"{result['evidence']['misfit_after'] ** 0.5:.2f} times."
         )
     if verdict == "tied":
@@ -162,10 +162,12 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
         return "what it leaves is neither noise nor what the numbers of the model make"
     if why == "held-out":
         return "motions that it was not fitted to get no better"
+    first = result["candidates"][0]["name"]
+    if result["verdict"] == "named" and first not in result["effects"] and candidate["behind"] < MARGIN:
+        return f"{' and '.join(result['effects'])} together leave far less"
     beside = result["further"] if result["verdict"] == "tied" else result["effects"][1:]
     if candidate["behind"] < MARGIN and beside:  # it was level by itself
         return f"behind with {' and '.join(beside)} in the model"
-    first = result["candidates"][0]["name"]
     return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
 
 

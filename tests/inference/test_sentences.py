@@ -88,6 +88,7 @@ def test_why_a_candidate_that_passes_by_itself_is_not_named() -> None:
     assert told(42.0) == "Ruled out: wind (90 %: 42 behind tilt in -2 log likelihood)."
     assert told(42.0, effects=["tilt", "drag"]) == told(42.0)
     assert told(3.0, effects=["tilt", "drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
+    assert "tilt (90 %: lag and drag together leave far less)" in told(3.0, effects=["lag", "drag"])
     tied = {"verdict": "tied", "effects": ["tilt", "lag"]}
     assert told(42.0, **tied) == told(42.0)
     assert told(3.0, **tied, further=["drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
