@@ -47,9 +47,10 @@ def promising_pairs(work: Work, stage: Stage) -> list[Pair]:
     """Pairs of the candidates of a stage, roughly fitted, the one that leaves least first.
 
     A fit with both starts from what each reached alone, which derivatives at the fit without them do not know of: a
-    grasp that slips or a rope that yields does nothing below a threshold. That is some twenty simulations a pair.
+    grasp that slips or a rope that yields does nothing below a threshold. That is some twenty simulations a pair. One
+    that leaves nothing but noise ends the search, unless the stage passes another effect, which its pairs may defend.
     """
-    found = []
+    found, passing = list[Pair](), set(stage.decision.effects)
     for lead, other in _chosen(stage):
         if not work.may_go_on():
             break
@@ -57,6 +58,8 @@ def promising_pairs(work: Work, stage: Stage) -> list[Pair]:
         starts = best_starts(work.objective((lead.name, other.name)), _starts(work, stage, lead, other))
         if starts:
             found.append(_fitted(work, lead, other, starts[0][0], FIRST_EVALUATIONS))
+            if stage.evidence.left(found[-1].both) == 0.0 and (not passing or passing & set(found[-1].names)):
+                return sorted(found, key=_left)
     found.sort(key=_left)
     for k, pair in enumerate(found[:CLOSER]):
         if work.may_go_on():

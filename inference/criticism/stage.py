@@ -64,7 +64,7 @@ def run_stage(
 ) -> Stage:
     """Hold every candidate of ``names`` against the model with ``effects``, whose fit starts at ``start``.
 
-    Candidates are tried from ``hints``, too, points ``(K, D)`` of the unit cube, by name, whatever these leave.
+    Candidates are tried from ``hints``, too, points ``(K, D)`` of the unit cube by name, whatever these leave.
     """
     work.study.progress("refitting the model as it is", 0, 0)
     work.see_numerics(effects, start)
@@ -120,15 +120,17 @@ class _Tournament:
         found = {name: _seen_only(look, self.plain) for name, look in self.looks.items()}
         # the most promising first, in case the budget ends early
         acting = sorted((n for n, look in self.looks.items() if look.responds), key=lambda n: self.looks[n].rss)
+        half = 0.5 * (self.work.count + self.until)
+        for name in (n for n, points in self.hints.items() if n in acting and len(points)):
+            if self.work.count < half:
+                self.work.study.progress(f"trying {name}", 0, 0)
+                found[name] = self.from_hints(found[name], self.hints[name])
         for k, name in enumerate(acting):
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
             look = self.looks[name]
             there = self.moved(found[name], look.at[None])
             off = look.reach >= FAR_OFF  # then points all over the prior are wrong by as much
             found[name] = self.rescaled(there, look) if off else self.screened(there, FEW_POINTS)
-        for name in (n for n in acting if len(self.hints.get(n, ()))):
-            self.work.study.progress(f"trying {name}", 0, 0)
-            found[name] = self.from_hints(found[name], self.hints[name])
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             self.work.study.progress(f"trying {name}", 0, 0)
@@ -183,8 +185,6 @@ class _Tournament:
 
     def from_hints(self, candidate: Candidate, points: FloatArray) -> Candidate:
         """The better of the candidate and of a short approach from the best of ``points (K, D)``."""
-        if not self.work.may_go_on(self.until):
-            return candidate
         best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
         if not best:
             return candidate

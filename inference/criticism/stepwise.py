@@ -86,7 +86,8 @@ def _stage(
 ) -> Stage:
     """A later stage. Candidates start from where they were alone and in pairs: of thresholds no derivative tells."""
     at, hints = dict(zip(work.space(effects).names, start, strict=True)), {}
-    for name in names:
+    paired = [n for p in pairs for n in p.names if n in names and {*p.names} == {*effects, n}]
+    for name in dict.fromkeys([*paired, *names]):
         alone, look = first.candidate(name), first.looks[name]
         points = [p.values for p in pairs if set(p.names) == {*effects, name}]
         if not np.array_equal(alone.fit.unit[alone.base :], look.start[look.base :]):

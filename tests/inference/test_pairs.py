@@ -12,7 +12,7 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.linear import Look, look_at
 from muslin.inference.criticism.pairs import partners, promising_pairs
 from muslin.inference.criticism.stage import Stage
-from muslin.inference.criticism.verdict import decide
+from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.discrepancy import NONE
 from muslin.inference.polish import Polished, polish
 
@@ -86,21 +86,34 @@ def stage() -> Stage:
     return Stage((), plain, looks, e, decide(e))
 
 
-def test_the_pair_that_is_missing_comes_first(stage: Stage) -> None:
-    pairs = promising_pairs(Bench(), stage)  # type: ignore[arg-type]
+@pytest.fixture
+def misfit(stage: Stage) -> Stage:
+    """The same where so little of the residuals is noise that no pair leaves nothing else."""
+    return replace(stage, evidence=replace(stage.evidence, count=200.0))
+
+
+def test_the_pair_that_is_missing_comes_first(misfit: Stage) -> None:
+    pairs = promising_pairs(Bench(), misfit)  # type: ignore[arg-type]
     assert set(pairs[0].names) == set(TRUTH)
-    assert pairs[0].lead.rss == min(c.rss for c in stage.evidence.candidates)
+    assert pairs[0].lead.rss == min(c.rss for c in misfit.evidence.candidates)
     assert pairs[0].values == pytest.approx({"stiffness": 0.5, "tilt.strength": 0.4, "slip.strength": 0.6}, abs=0.1)
     assert pairs[0].both.rss < 1.2 * pairs[0].both.fit.count < min(p.both.rss for p in pairs[1:])
 
 
-def test_no_pair_is_tried_twice_nor_beyond_the_budget(stage: Stage) -> None:
+def test_one_that_leaves_only_noise_ends_the_search(stage: Stage) -> None:
+    (pair,) = promising_pairs(Bench(), stage)  # type: ignore[arg-type]
+    assert set(pair.names) == set(TRUTH)
+    for effect, more in (("tilt", False), ("wind", True)):  # pairs with what passes by itself are tried in any case
+        passing = replace(stage, decision=Decision("named", (effect,)))
+        assert (len(promising_pairs(Bench(), passing)) > 1) is more  # type: ignore[arg-type]
+
+
+def test_no_pair_is_tried_twice_nor_beyond_the_budget(misfit: Stage) -> None:
     bench = Bench()
-    promising_pairs(bench, stage)  # type: ignore[arg-type]
-    first_time = bench.fits[: len({frozenset(f) for f in bench.fits})]
-    assert len({frozenset(f) for f in first_time}) == len(first_time)
+    pairs = promising_pairs(bench, misfit)  # type: ignore[arg-type]
+    assert len({frozenset(p.names) for p in pairs}) == len(pairs) > 2
     few = Bench(most=2)
-    assert len(promising_pairs(few, stage)) == 2 == len(few.fits)  # type: ignore[arg-type]
+    assert len(promising_pairs(few, misfit)) == 2 == len(few.fits)  # type: ignore[arg-type]
 
 
 def test_without_a_candidate_that_explains_anything_there_is_no_pair(stage: Stage) -> None:

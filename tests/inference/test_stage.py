@@ -91,8 +91,6 @@ def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_th
     hints = np.array([[0.5, 0.2], [0.5, 0.8]])
     assert tournament.from_hints(candidate("drag", 2 * COUNT), hints).rss == pytest.approx(reached * COUNT)
     assert starts == [pytest.approx(hints[1])]
-    work.count = work.limit
-    assert tournament.from_hints(candidate("drag", 2 * COUNT), hints).rss == pytest.approx(2 * COUNT)
 
 
 @pytest.mark.parametrize(
