@@ -83,9 +83,9 @@ def diagnose(
         say(f"wrote {json_file}")
     effects = verdict.get("effects") or []
     if verdict.get("verdict") in ("named", "tied") and effects:
-        tied = verdict.get("verdict") == "tied"
-        chosen = [effects[0], *(verdict.get("further") or [])] if tied else effects
-        further = [command("next", study)] if tied else []
+        tied, beside = verdict.get("verdict") == "tied", verdict.get("further") or []
+        chosen = [effects[0], *beside] if tied else effects
+        further = [command("next", study)] if tied or beside else []
         next_step(add_commands(study, chosen), *further, command("report", study))
     else:
         further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])

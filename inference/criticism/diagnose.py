@@ -84,7 +84,7 @@ def _models(found: Findings) -> list[dict[str, Any]]:
     """The fitted models that came nearest, best first."""
     best = sorted(found.first.evidence.candidates, key=lambda c: c.rank)[:KEPT]
     best += [c for c in found.first.evidence.candidates if c.name in found.effects and c not in best]
-    each: list[tuple[list[str], Candidate]] = [([c.name], c) for c in best]
+    each = [([c.name], c) for c in best] + [(list(names), c) for names, c in found.rivals]
     if len(found.effects) > 1 and found.verdict == "named":
         each.insert(0, (list(found.effects), found.after))
     return [

@@ -31,6 +31,7 @@ class Findings:
         further: effects beside the named ones of which one is missing, too, and which is not to be told; beside tied
             ones, an effect that is missing whichever of them it is.
         rest: what was decided with the named ones in the model; None where that was not looked into.
+        rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
     """
 
     verdict: Verdict
@@ -40,6 +41,7 @@ class Findings:
     after: Candidate
     further: tuple[str, ...] = ()
     rest: Decision | None = None
+    rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
 
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
@@ -71,7 +73,8 @@ def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -
         after = work.judged(replace(found.after, fit=stage.plain))
         found = replace(found, after=after, rest=stage.decision)
         if stage.decision.verdict == "tied":
-            return replace(found, further=stage.decision.effects)
+            rivals = tuple(((*found.effects, n), stage.candidate(n)) for n in stage.decision.effects)
+            return replace(found, further=stage.decision.effects, rivals=rivals)
         if stage.decision.verdict != "named":
             break
         effects = (*found.effects, stage.chosen.name)
@@ -139,8 +142,8 @@ def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pai
     if stage.decision.verdict != "named":
         return None
     second = stage.chosen
-    rivals = [n for n in found.effects if n != lead.name]
-    beside = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in rivals}
+    others = [n for n in found.effects if n != lead.name]
+    beside = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in others}
     order = sorted(beside, key=lambda n: beside[n].rss)
     e, ahead = stage.evidence, beside[order[0]]
     margin = MARGIN + SHARE_LEFT * e.left(ahead)
@@ -150,7 +153,8 @@ def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pai
         if e.behind(beside[n], ahead) < margin or beside[n].held_out_white <= ahead.held_out_white
     ]  # fmt: skip
     if len(near) > 1:
-        return Findings("tied", tuple(near), first, stage, ahead, further=(second.name,))
+        rivals = tuple(((n, second.name), beside[n]) for n in near)
+        return Findings("tied", tuple(near), first, stage, ahead, further=(second.name,), rivals=rivals)
     named = Findings("named", (order[0], second.name), first, stage, ahead)
     return _forward(work, names, _without_idle(work, named), pairs)
 

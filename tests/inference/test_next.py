@@ -20,11 +20,13 @@ from next_world import (
 
 from muslin.cli.report.figures_motion import motion_figure
 from muslin.core.errors import InputError, StepMissingError
+from muslin.core.registry import REGISTRY
 from muslin.core.store import read
 from muslin.core.study import Study
 from muslin.inference.criticism.next import opening
 from muslin.inference.criticism.next.rivals import knowing
 from muslin.inference.criticism.next.step import NextExperiment, propose_next
+from muslin.inference.criticism.next.words import explain
 from muslin.inference.sequential.result import load_fit
 
 FEW = 60
@@ -110,6 +112,41 @@ def test_kept_models_are_used_and_none_refitted(tmp_path: Path, monkeypatch: pyt
     tied_drags(study)
     monkeypatch.setattr(opening, "refitted_rival", lambda *_: pytest.fail("refitted"))
     assert propose(study, simulations=30).result["simulations"] <= 45
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "further", "open_", "beside"),
+    [
+        ("tied", ("linear-drag", "twin-drag"), ("quadratic-drag",), ("linear-drag", "twin-drag"), ("quadratic-drag",)),
+        ("named", ("quadratic-drag",), ("linear-drag", "twin-drag"), ("linear-drag", "twin-drag"), ("quadratic-drag",)),
+    ],
+)
+def test_what_is_missing_whichever_it_is_is_in_every_model(
+    tmp_path: Path, verdict: str, named: tuple[str, ...], further: tuple[str, ...], open_: tuple[str, ...],
+    beside: tuple[str, ...],
+) -> None:  # fmt: skip
+    study = rope_study(tmp_path)
+    other = kept(study, beside[0], 6.0, 20.0)
+    models = []
+    for name in open_:
+        model = kept(study, name, 1.0, 5.0)
+        joint = {"effects": [*beside, name], "values": {**other["values"], **model["values"]}}  # type: ignore[dict-item]
+        unit = [*other["unit"], model["unit"][-1]]  # type: ignore[misc,index]
+        models.append(model | joint | {"unit": unit, "covariance": np.diag([4e-4, 1e-3, 2e-3]).tolist()})
+    put_diagnosis(study, verdict, list(named), models=[*models, kept(study, open_[0], 2.0, 5.0)])
+    group = study.results("r+")["diagnose"]
+    group.attrs["result"] = {**group.attrs["result"], "further": list(further)}  # type: ignore[dict-item]
+    found = opening.opening_of(study)
+    assert (found.purpose, found.effects, found.beside) == ("tied", open_, beside)
+    known = knowing(study.problem, {n: REGISTRY.get("effect", n) for n in found.all_effects})
+    rivals, count = opening.tied_rivals(study, known, load_fit(study), np.zeros(1), found)
+    assert count == 0 and [r.name for r in rivals] == list(open_)
+    for name, rival in zip(open_, rivals, strict=True):
+        assert rival.values()[f"{name}.rate"] == pytest.approx(1.0)
+        assert rival.values()["quadratic-drag.factor"] == pytest.approx(6.0)
+        assert rival.covariance[-1, -1] == (1e-3 if rival.space.names[-1] == "quadratic-drag.factor" else 2e-3)
+    said = explain({"purpose": "tied", "effects": open_, "beside": beside, "motion": None, "tried": 3}, "")[0]
+    assert said == "Tied now: linear-drag, twin-drag, with quadratic-drag in the model."
 
 
 def test_what_the_recordings_decide_needs_no_motion(tmp_path: Path) -> None:

@@ -108,6 +108,8 @@ def test_it_may_be_the_other_one(found: tuple[Findings, list[tuple[str, ...]]]) 
 @outcome(2.0, 1.0, 1.0)
 def test_or_leave_them_tied_and_be_missing_beside_either(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
     assert (found[0].verdict, found[0].effects, found[0].further) == ("tied", ("tilt", "wind"), ("drag",))
+    for (names, rival), lead in zip(found[0].rivals, ("tilt", "wind"), strict=True):  # for an experiment to tell apart
+        assert names == (lead, "drag") and rival.space.names == ("stiffness", f"{lead}.strength", "drag.strength")
 
 
 @outcome(2.0, 1.0, 1.8, held_out=0.9)

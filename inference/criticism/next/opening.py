@@ -1,7 +1,7 @@
 """What a diagnosis left open, and the models that go with it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ....core.arrays import FloatArray
@@ -21,7 +21,7 @@ class Opening:
     Args:
         purpose: what is asked.
         effects: that are tied, or were not seen.
-        beside: effects that were named, which every model has, too, where effects were not seen.
+        beside: effects that are missing, too, whichever of those it is: every model has them.
         models: what the diagnosis kept of its models.
         means: coefficients that the diagnosis found, ``effect.coefficient`` [units].
         candidates: effects that it tried.
@@ -62,12 +62,15 @@ def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
     if asked:
         _check(study, asked)
         return Opening("tied" if len(asked) > 1 else "unseen", tuple(asked), **kept)
+    named, further = tuple(result["effects"]), tuple(result.get("further") or ())
     if result["verdict"] == "tied":
-        return Opening("tied", tuple(result["effects"]), **kept)
+        return Opening("tied", named, further, **kept)
+    if further:
+        return Opening("tied", further, named, **kept)
     hidden = [r["name"] for r in rows if not r.get("visible", r["identifiability"] > 0)]
     if hidden:
-        return Opening("unseen", tuple(hidden), tuple(result["effects"]), **kept)
-    told = " and ".join(result["effects"])
+        return Opening("unseen", tuple(hidden), named, **kept)
+    told = " and ".join(named)
     reason = (
         f"{told} is named, and no other candidate would have been hidden"
         if told
@@ -83,14 +86,15 @@ def tied_rivals(
 
     They are compared by how well they fit, so either all are taken from the diagnosis, or none.
     """
-    kept = [r for r in (kept_rival(problem, (n,), opening.models) for n in opening.effects) if r is not None]
-    if len(kept) == len(opening.effects):
-        return kept, 0
+    beside = opening.beside
+    kept = {n: kept_rival(problem, (n, *beside), opening.models) for n in opening.effects}
+    if all(kept.values()):
+        return [replace(r, name=n) for n, r in kept.items() if r is not None], 0
     out = []
     with study.pool(problem) as pool:
         for k, name in enumerate(opening.effects):
             study.progress(f"refitting {name}", k + 1, len(opening.effects))
-            out.append(refitted_rival(study, problem, pool, fit, name, plain, opening.means))
+            out.append(refitted_rival(study, problem, pool, fit, (name, *beside), plain, opening.means))
         count = pool.count
     return out, count
 

@@ -98,22 +98,22 @@ def refitted_rival(
     problem: Problem,
     pool: SimulationPool,
     known: FitResult,
-    effect: str,
+    effects: Sequence[str],
     plain: FloatArray,
     means: Mapping[str, float],
 ) -> Rival:
-    """The model with ``effect``, polished from weak or typical coefficients, or from those that the diagnosis found.
+    """The model with ``effects``, polished from weak or typical coefficients, or from those that the diagnosis found.
 
     Args:
         study: that is fitted.
         problem: of the study, knowing the classes of the effects.
         pool: of the same problem.
         known: the study's fit.
-        effect: beyond those of the study.
+        effects: beyond those of the study, of which the first is in question.
         plain: the fit without them in the unit cube.
         means: coefficients of the diagnosis, ``effect.coefficient`` [units]; may lack some.
     """
-    space = problem.with_effects(effect).space
+    space = problem.with_effects(*effects).space
     extra = ParameterSpace(tuple(space)[len(plain) :])
     none = zero_of(extra)
     starts = [none + share * np.where(none < 0.7, 1.0, -1.0) for share in (0.02, TYPICAL)]
@@ -126,7 +126,7 @@ def refitted_rival(
     fit = polish(objective, points[int(np.argmin(sizes))], EVALUATIONS)
     # what the model leaves unexplained makes its parameters that much less certain
     covariance = fit.covariance * max(1.0, fit.rss / fit.count)
-    return Rival(effect, space, fit.unit, covariance, fit.rss)
+    return Rival(effects[0], space, fit.unit, covariance, fit.rss)
 
 
 def leads_of(rivals: Sequence[Rival]) -> FloatArray:

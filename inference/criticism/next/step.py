@@ -137,6 +137,7 @@ def _result(
         "purpose": opening.purpose,
         "reason": opening.reason,
         "effects": list(opening.effects),
+        "beside": list(opening.beside),
         "tells": False,
         "probability": 0.0,
         "probabilities": {},

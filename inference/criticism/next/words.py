@@ -19,7 +19,8 @@ def explain(result: dict[str, Any], limits: str) -> list[str]:
     if purpose == "nothing":
         return [f"Nothing is open: {result['reason']}. No further motion is proposed."]
     what = "Tied now" if purpose == "tied" else "Not visible in these data"
-    out = [f"{what}: {', '.join(names)}."]
+    beside = f", with {' and '.join(result['beside'])} in the model" if result["beside"] else ""
+    out = [f"{what}: {', '.join(names)}{beside}."]
     motion = result["motion"]
     if motion is None:
         out.append(
