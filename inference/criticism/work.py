@@ -22,8 +22,9 @@ from .verdict import Evidence
 
 #: Share of the simulations that the search leaves: for what it has begun when they end, and for telling what it found.
 RESERVED = 0.15
-#: Simulations of a diagnosis for every recording that is fitted, and at least; ropes are quick to simulate.
-A_RECORDING, A_RECORDING_OF_A_ROPE, AT_LEAST = 440, 1250, 880
+#: Simulations of a diagnosis for every recording that is fitted, and at least, by kind of object; ropes are quick.
+A_RECORDING = {"rope": 1250, "cloth": 440, "solid": 500}
+AT_LEAST = {"rope": 1250, "cloth": 880, "solid": 1000}
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 
@@ -31,8 +32,8 @@ USER_EVALUATIONS = 8
 def usual_simulations(problem: Problem) -> int:
     """How many simulations a diagnosis may take where the study does not say."""
     name = problem.fit_on[0]
-    each = A_RECORDING_OF_A_ROPE if problem.scenarios[name].body.kind == "rope" else A_RECORDING
-    return max(AT_LEAST, round(each * len(problem.fit_on) / problem.pieces))
+    kind = problem.scenarios[name].body.kind
+    return max(AT_LEAST[kind], round(A_RECORDING[kind] * len(problem.fit_on) / problem.pieces))
 
 
 class Work:

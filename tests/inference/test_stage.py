@@ -25,7 +25,7 @@ def test_a_budget_ends_where_it_is_told_to_and_that_is_remembered() -> None:
 
 @pytest.mark.parametrize(
     "kind, takes, pieces, usual",
-    [("cloth", 1, 1, 880), ("cloth", 4, 1, 1760), ("rope", 2, 1, 2500), ("rope", 2, 4, 2500)],
+    [("cloth", 1, 1, 880), ("cloth", 4, 1, 1760), ("rope", 2, 1, 2500), ("rope", 2, 4, 2500), ("solid", 2, 1, 1000)],
 )
 def test_more_recordings_and_objects_that_are_quick_to_simulate_get_more_simulations(
     kind: str, takes: int, pieces: int, usual: int
