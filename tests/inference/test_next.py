@@ -152,9 +152,17 @@ def test_what_is_missing_whichever_it_is_is_in_every_model(
 def test_what_the_recordings_decide_needs_no_motion(tmp_path: Path) -> None:
     study = rope_study(tmp_path)
     tied_drags(study, lead=25.0)
-    found = propose(study)
+    found = propose(study, effects=("linear-drag", "quadratic-drag"))
     assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0 and found.motion is None
     assert "linear-drag fits better than quadratic-drag, by 25" in found.text()
+
+
+def test_a_lead_that_the_diagnosis_does_not_go_by_decides_nothing(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, LinearDrag(rate=1.0))
+    tied_drags(study, lead=25.0)
+    limits = {"max_speed": 1.0, "max_acceleration": 10.0, "workspace": (-0.2, 0.2) * 3, "duration": 1.2}
+    found = propose(study, simulations=30, **limits)
+    assert found.result["purpose"] == "tied" and found.motion is not None
 
 
 def test_nothing_open_is_said_without_a_simulation(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ class Opening:
         means: coefficients that the diagnosis found, ``effect.coefficient`` [units].
         candidates: effects that it tried.
         reason: why nothing is open.
+        undecided: the diagnosis compared them, and does not go by what they differ by on the recordings.
     """
 
     purpose: Purpose
@@ -35,6 +36,7 @@ class Opening:
     means: Mapping[str, float] = field(default_factory=dict)
     candidates: int = 1
     reason: str = ""
+    undecided: bool = False
 
     @property
     def all_effects(self) -> tuple[str, ...]:
@@ -64,9 +66,9 @@ def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
         return Opening("tied" if len(asked) > 1 else "unseen", tuple(asked), **kept)
     named, further = tuple(result["effects"]), tuple(result.get("further") or ())
     if result["verdict"] == "tied":
-        return Opening("tied", named, further, **kept)
+        return Opening("tied", named, further, undecided=True, **kept)
     if further:
-        return Opening("tied", further, named, **kept)
+        return Opening("tied", further, named, undecided=True, **kept)
     hidden = [r["name"] for r in rows if not r.get("visible", r["identifiability"] > 0)]
     if hidden:
         return Opening("unseen", tuple(hidden), named, **kept)

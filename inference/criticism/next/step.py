@@ -25,7 +25,7 @@ from .goal import Goal
 from .limits import Limits, limits_within
 from .opening import Opening, opening_of, tied_rivals
 from .playing import peaks_of, write_motion
-from .rivals import Rival, kept_rival, knowing
+from .rivals import Rival, kept_rival, knowing, leads_of
 from .search import Found, Search
 from .shapes import Known, fastest_swing, known_shapes
 from .words import SURE, TELLS, explain
@@ -113,7 +113,9 @@ def _goal(study: Study, problem: Problem, fit: FitResult, opening: Opening) -> t
     plain = Rival("the model as it is", study.problem.space, unit, covariance)
     if opening.purpose == "tied":
         models, spent = tied_rivals(study, problem, fit, plain.unit, opening)
-        return Goal("tied", tuple(models), np.full((len(models), len(models)), MARGIN)), spent
+        # a lead that did not decide, as more than noise is left or held-out motions say otherwise, never will
+        lead = np.maximum(leads_of(models), 0.0) if opening.undecided else 0.0
+        return Goal("tied", tuple(models), np.full((len(models), len(models)), MARGIN) + lead), spent
     named = kept_rival(problem, opening.beside, opening.models) if opening.beside else None
     return _unseen_goal(problem, named or plain, opening), 0
 
