@@ -121,7 +121,7 @@ class _Tournament:
         # the most promising first, in case the budget ends early
         acting = sorted((n for n, look in self.looks.items() if look.responds), key=lambda n: self.looks[n].rss)
         half = 0.5 * (self.work.count + self.until)
-        for name in (n for n, points in self.hints.items() if n in acting and len(points)):
+        for name in (n for n in self.hints if n in acting):
             if self.work.count < half:
                 self.work.study.progress(f"trying {name}", 0, 0)
                 found[name] = self.from_hints(found[name], self.hints[name])

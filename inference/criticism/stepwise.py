@@ -88,15 +88,21 @@ def _stage(
     work: Work, first: Stage, effects: tuple[str, ...], names: list[str], start: FloatArray, pairs: list[Pair]
 ) -> Stage:
     """A later stage. Candidates start from where they were alone and in pairs: of thresholds no derivative tells."""
-    at, hints = dict(zip(work.space(effects).names, start, strict=True)), {}
-    paired = [n for p in pairs for n in p.names if n in names and {*p.names} == {*effects, n}]
-    for name in dict.fromkeys([*paired, *names]):
+    at = dict(zip(work.space(effects).names, start, strict=True))
+    points: dict[str, list[dict[str, float]]] = {}
+    for pair in pairs:
+        for name in set(pair.names).intersection(names):
+            if set(pair.names) == {*effects, name}:
+                points.setdefault(name, []).append(pair.values)
+    for name in names:
         alone, look = first.candidate(name), first.looks[name]
-        points = [p.values for p in pairs if set(p.names) == {*effects, name}]
-        if not np.array_equal(alone.fit.unit[alone.base :], look.start[look.base :]):
-            points.append(at | dict(zip(alone.space.names[alone.base :], alone.fit.unit[alone.base :], strict=True)))
+        own, zero = alone.fit.unit[alone.base :], look.start[look.base :]
+        if not np.array_equal(own, zero):
+            points.setdefault(name, []).append(at | dict(zip(alone.space.names[alone.base :], own, strict=True)))
+    hints = {}
+    for name, values in points.items():
         order = work.space((*effects, name)).names
-        hints[name] = np.array([[point[n] for n in order] for point in points]).reshape(-1, len(order))
+        hints[name] = np.array([[point[n] for n in order] for point in values])
     return settled(work, run_stage(work, effects, names, start, hints))
 
 
@@ -118,11 +124,8 @@ def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Find
     if not pairs or not work.may_go_on():
         return None
     lead = pairs[0].lead
-    rest = [
-        n
-        for n in names
-        if n in partners(first, lead.name, PARTNERS) or any({n, lead.name} == {*p.names} for p in pairs)
-    ]
+    likely = {*partners(first, lead.name, PARTNERS), *(n for p in pairs if lead.name in p.names for n in p.names)}
+    rest = [n for n in names if n in likely - {lead.name}]
     stage = _stage(work, first, (lead.name,), rest, lead.fit.unit, pairs)
     if stage.decision.verdict != "named" or not work.jointly(stage.chosen, first.plain).accounted(stage.chosen):
         return None
@@ -133,12 +136,12 @@ def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Find
 def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings | None:
     """A second effect beside those that are tied; with it in the model they may be told apart."""
     first = found.first
-    others = [n for n in names if n not in found.effects]
-    if first.evidence.left(found.after) == 0.0 or not others or not work.may_go_on():
+    rest = [n for n in names if n not in found.effects]
+    if first.evidence.left(found.after) == 0.0 or not rest or not work.may_go_on():
         return None
     best = [n for n in (pairs[0].names if pairs else ()) if n in found.effects]
     lead = first.candidate(best[0]) if best else found.after
-    stage = _stage(work, first, (lead.name,), others, lead.fit.unit, pairs)
+    stage = _stage(work, first, (lead.name,), rest, lead.fit.unit, pairs)
     if stage.decision.verdict != "named":
         return None
     second = stage.chosen

@@ -87,6 +87,11 @@ def test_all_that_was_named_is_added_by_the_next_command(
     assert status("diagnose", str(study)) == 0
     told = capsys.readouterr().out
     assert f"muslin add wind {study} -o {between} && muslin add hem {between} -o" in told and "add gravity" not in told
+    for further, more in ((["hem", "lag"], True), ([], False)):  # which one is missing, too, another motion may tell
+        found = {"verdict": "named", "effects": ["wind"], "further": further}
+        step("diagnose", lambda s, found=found: Result(found))  # type: ignore[misc]
+        assert status("diagnose", str(study)) == 0
+        assert (f"muslin next {study}" in capsys.readouterr().out) is more
 
 
 def test_a_missing_folder_is_told_before_anything_is_simulated(step: Callable[..., None], study: Path) -> None:

@@ -4,12 +4,12 @@ import base64
 import json
 import re
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_up_study import ROLES, make_study
+from report_page import Page, page_of
 
 from muslin.cli import steps
 from muslin.cli.report import overview_figure, write_report
@@ -20,47 +20,6 @@ from muslin.cli.report.words import spread
 from muslin.core.errors import MissingFileError, MuslinError, StepMissingError, StoreError
 from muslin.core.store import storage_errors
 from muslin.core.study.study import Study
-
-
-class Page(HTMLParser):
-    """What a page holds: sections, images, addresses, scripts, and its text."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.sections: list[str] = []
-        self.figures = {"svg": 0, "img": 0, "canvas": 0, "figure": 0, "details": 0}
-        self.addresses: list[str] = []
-        self.open: list[str] = []
-        self.scripts: list[str] = []
-        self.text = ""
-        self.feed(html)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        table = dict(attrs)
-        if tag == "section":
-            self.sections.append(table["id"] or "")
-        if tag in self.figures:
-            self.figures[tag] += 1
-        self.addresses += [v or "" for k, v in attrs if k in ("src", "href", "xlink:href", "srcset", "action")]
-        if tag in ("section", "script", "style", "figure", "table", "main", "b", "i", "dl", "details"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        if self.open and tag in ("section", "script", "style", "figure", "table", "main", "b", "i", "dl", "details"):
-            assert self.open.pop() == tag, f"</{tag}> closes something else"
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] == "script":
-            self.scripts.append(data)
-        elif not self.open or self.open[-1] != "style":
-            self.text += data
-
-
-def page_of(study: Study, after: Study | None = None) -> Page:
-    page = Page(write_report(study, after=after).read_text(encoding="utf-8"))
-    page.text = " ".join(page.text.replace("\u00a0", " ").replace("\u202f", " ").split())
-    return page
 
 
 def test_nothing_fitted_says_so(tmp_path: Path) -> None:
@@ -107,50 +66,6 @@ def test_after_everything(tmp_path: Path) -> None:
     assert "neither found nor ruled out: actuator lag" in page.text
     assert page.text.index("the fit never saw it") > page.text.index("Made by")
     assert (tmp_path / "cloth.report.html").stat().st_size < 3e6
-
-
-@pytest.mark.parametrize(
-    ("verdict", "says"),
-    [
-        ("tied", "Air drag or viscous damping is missing from the model; these recordings cannot tell which. With"),
-        ("none", "no candidate explains it"),
-        ("cannot-tell", "cannot show what is missing"),
-        ("no-misfit", "Nothing is seen to be missing"),
-    ],
-)
-def test_other_verdicts_claim_no_fall_of_the_error_but_a_tie(tmp_path: Path, verdict: str, says: str) -> None:
-    page = page_of(make_study(tmp_path, "fit", "compare", "diagnose", verdict=verdict))
-    assert says in page.text
-    if verdict != "tied":
-        assert "falls from" not in page.text and "→" not in page.text.split("The object at")[0]
-    assert ("with air drag (candidate)" in page.text) == (verdict != "no-misfit")
-
-
-def test_two_missing_effects_are_told_as_two(tmp_path: Path) -> None:
-    study = make_study(tmp_path, "fit", "compare", "diagnose")
-    group = study.results("r+")["diagnose"]
-    group.attrs["result"] = {**group.attrs["result"], "effects": ["air-drag", "viscous-damping"]}
-    assert "Air drag and viscous damping are missing from the model; with them, the" in page_of(study).text
-
-
-def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
-    study = make_study(tmp_path, "fit", "compare", "diagnose")
-    group = study.results("r+")["diagnose"]
-    tied = {"verdict": "tied", "effects": ["air-drag", "viscous-damping"], "further": ["wind"]}
-    group.attrs["result"] = {**group.attrs["result"], **tied}
-    text = page_of(study).text
-    assert "Whichever it is, wind is missing, too. With air drag and wind, the" in text
-    assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
-
-
-@pytest.mark.parametrize("verdict", ["named", "tied"])
-def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tmp_path: Path, verdict: str) -> None:
-    study = make_study(tmp_path, "fit", "compare", "diagnose")
-    group, named = study.results("r+")["diagnose"], verdict == "named"
-    both = {"effects": ["air-drag", "wind"]} if named else {"effects": ["air-drag", "hem"], "further": ["wind"]}
-    group.attrs["result"] = {**group.attrs["result"], "verdict": verdict, **both}
-    text = page_of(study, make_study(tmp_path, "fit", "compare", drag=True)).text
-    assert "ith air drag, the" in text and "air drag and wind, the" not in text and "with them" not in text
 
 
 def test_a_second_study_is_the_after(tmp_path: Path) -> None:

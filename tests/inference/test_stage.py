@@ -86,11 +86,14 @@ def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_th
         return candidate("drag", from_there * COUNT).fit
 
     work, tournament = bench(polished)
-    white = {0.2: np.full(int(COUNT), 3.0), 0.8: np.full(int(COUNT), 2.0)}
-    work.objective = lambda effects: SimpleNamespace(many=lambda points: [white[p[1]] for p in points])
+    work.objective = lambda effects: SimpleNamespace(
+        many=lambda points: [np.full(int(COUNT), 2.0 if p[1] == 0.8 else 3.0) for p in points]
+    )
     hints = np.array([[0.5, 0.2], [0.5, 0.8]])
-    assert tournament.from_hints(candidate("drag", 2 * COUNT), hints).rss == pytest.approx(reached * COUNT)
-    assert starts == [pytest.approx(hints[1])]
+    tournament.hints = {"drag": hints}
+    (found,) = tournament.run()
+    assert starts[0] == pytest.approx(hints[1])
+    assert found.rss == pytest.approx(reached * COUNT)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,51 @@
+"""What the first sentences of a report say of a verdict."""
+
+from pathlib import Path
+
+import pytest
+from made_up_study import make_study
+from report_page import page_of
+
+
+@pytest.mark.parametrize(
+    ("verdict", "says"),
+    [
+        ("tied", "Air drag or viscous damping is missing from the model; these recordings cannot tell which. With"),
+        ("none", "no candidate explains it"),
+        ("cannot-tell", "cannot show what is missing"),
+        ("no-misfit", "Nothing is seen to be missing"),
+    ],
+)
+def test_other_verdicts_claim_no_fall_of_the_error_but_a_tie(tmp_path: Path, verdict: str, says: str) -> None:
+    page = page_of(make_study(tmp_path, "fit", "compare", "diagnose", verdict=verdict))
+    assert says in page.text
+    if verdict != "tied":
+        assert "falls from" not in page.text and "→" not in page.text.split("The object at")[0]
+    assert ("with air drag (candidate)" in page.text) == (verdict != "no-misfit")
+
+
+def test_two_missing_effects_are_told_as_two(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group = study.results("r+")["diagnose"]
+    group.attrs["result"] = {**group.attrs["result"], "effects": ["air-drag", "viscous-damping"]}
+    assert "Air drag and viscous damping are missing from the model; with them, the" in page_of(study).text
+
+
+def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group = study.results("r+")["diagnose"]
+    tied = {"verdict": "tied", "effects": ["air-drag", "viscous-damping"], "further": ["wind"]}
+    group.attrs["result"] = {**group.attrs["result"], **tied}
+    text = page_of(study).text
+    assert "Whichever it is, wind is missing, too. With air drag and wind, the" in text
+    assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
+
+
+@pytest.mark.parametrize("verdict", ["named", "tied"])
+def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tmp_path: Path, verdict: str) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group, named = study.results("r+")["diagnose"], verdict == "named"
+    both = {"effects": ["air-drag", "wind"]} if named else {"effects": ["air-drag", "hem"], "further": ["wind"]}
+    group.attrs["result"] = {**group.attrs["result"], "verdict": verdict, **both}
+    text = page_of(study, make_study(tmp_path, "fit", "compare", drag=True)).text
+    assert "ith air drag, the" in text and "air drag and wind, the" not in text and "with them" not in text
