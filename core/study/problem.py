@@ -24,6 +24,7 @@ from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
 from ..scenarios.kept import told_bend
 from ..scenarios.measured import with_earlier
+from ..scenarios.spacing import told_places
 from ..scenarios.standoffs import told_standoffs
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
@@ -156,6 +157,15 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if config.scenario.markers == "beside":  # held-out recordings must not tell, here and below
         beside = told_standoffs([recordings[n] for n in fit_on])
     scenarios = {n: build_scenario(config.scenario, r, folder, marked, beside) for n, r in recordings.items()}
+    if config.scenario.spacing is not None:
+        if not marked:
+            raise InputError(
+                f"[scenario] spacing = 'measured' is for markers, but extractor {config.extractor.name!r} finds points "
+                "of its own; leave spacing out"
+            )
+        first = scenarios[fit_on[0]]
+        places = told_places(first.body, first.markers, [recordings[n] for n in fit_on])
+        scenarios = {n: replace(s, markers=places) for n, s in scenarios.items()}
     kind = scenarios[fit_on[0]].body.kind
     if config.scenario.start == "measured":
         kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])

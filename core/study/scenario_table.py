@@ -74,7 +74,9 @@ class ScenarioTable(StrictTable):
     as it stands in the world at the start. ``start = "measured"`` lets a rope start through the markers of the first
     frame, at once, and says where they are on it: its length, and so its mass, follow from each take. With
     ``markers = "beside"`` these stand beside the axis of the rope, see
-    :func:`~muslin.core.scenarios.standoffs.told_standoffs`.
+    :func:`~muslin.core.scenarios.standoffs.told_standoffs`. With ``spacing = "measured"`` the markers of a flat cloth
+    sit as far apart as the recordings that are fitted show, near where ``markers`` says, see
+    :func:`~muslin.core.scenarios.spacing.told_places`.
     """
 
     name: str
@@ -90,6 +92,7 @@ class ScenarioTable(StrictTable):
     grasp_radius: float = Field(default=0.0, ge=0)
     start: Literal["measured"] | None = None
     markers: list[int] | Literal["all", "bound", "surface", "beside"] | None = None
+    spacing: Literal["measured"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
     obstacles: list[ObstacleTable] | None = None
@@ -122,6 +125,11 @@ class ScenarioTable(StrictTable):
             self._only_measured()
         elif self.markers == "beside":
             raise ValueError("markers = 'beside' is for a rope that starts as measured; add start = 'measured'")
+        if self.spacing is not None and self.markers in ("bound", "surface", "beside"):
+            raise ValueError(
+                f"spacing = 'measured' moves markers that sit on vertices, not markers = {self.markers!r}; keep one of "
+                "the two"
+            )
         if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
             raise ValueError("grasp_radius goes with grasp_points, which are missing")
         return self
@@ -130,6 +138,7 @@ class ScenarioTable(StrictTable):
         """What the first frame tells is not told here too: it would be ignored."""
         told = [k for k in ("mesh", "size") if getattr(self, k) is not None]
         told += ["markers"] if self.markers not in (None, "beside") else []
+        told += ["spacing"] if self.spacing is not None else []
         told += ["frame"] if self.frame != "gripper" else []
         if told:
             raise ValueError(

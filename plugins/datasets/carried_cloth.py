@@ -17,6 +17,8 @@ from .grid_faults import lost_cloth
 
 #: Orientation of the hand, w x y z, in which the cloth hangs in the x-z plane, its columns from low to high x.
 HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
+#: Where the held edge of a cloth points that hangs so.
+X = np.array([1.0, 0.0, 0.0])
 #: Lags of the camera behind the gripper that are tried [s]: beyond what was found, both ways.
 LAGS = np.arange(-0.6, 0.6001, 0.01)
 #: Hand and cloth must correlate this much at some lag [1].
@@ -69,7 +71,7 @@ def _recording(path: Path, name: str) -> Recording:
     middle = top[whole].mean(axis=1)
     if "tcp" not in data:
         note(f"{name}: no poses of the robot; the tracked top edge is taken for the gripper")
-        turns = carried_turns(_along(top[whole]), np.array([1.0, 0.0, 0.0]))
+        turns = carried_turns(_along(top[whole]), X)
         motion = Motion(time[whole], np.concatenate([middle, turns], axis=1)[:, None])
         return Recording(name, PointSeries(time, points), motion)
     if "tcp_t" not in data:
@@ -85,8 +87,11 @@ def _recording(path: Path, name: str) -> Recording:
     turns = multiply(hand[:, [6, 3, 4, 5]], inverse(HOME))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     then = Motion(clock, np.concatenate([hand[:, :3], turns], axis=1)[:, None]).at(time[whole] - lag)[:, 0]
-    held = np.median(rotate(inverse(then[:, 3:]), middle - then[:, :3]), axis=0)
-    poses = np.concatenate([hand[:, :3] + rotate(turns, held), turns], axis=1)
+    in_hand = inverse(then[:, 3:])
+    held = np.median(rotate(in_hand, middle - then[:, :3]), axis=0)
+    along = np.median(rotate(in_hand, _along(top[whole])), axis=0)
+    leaning = carried_turns(along[None], X)[0]
+    poses = np.concatenate([hand[:, :3] + rotate(turns, held), multiply(turns, leaning)], axis=1)
     return Recording(name, PointSeries(time - lag, points), Motion(clock, poses[:, None]))
 
 
@@ -129,9 +134,10 @@ def _spread(path: FloatArray) -> float:
 
 
 def _along(top: FloatArray) -> FloatArray:
-    """Direction of the top edge ``(T, 3)``: the slope of its nodes over their number."""
+    """Direction of the top edge, unit vectors ``(T, 3)``: the slope of its nodes over their number."""
     share = np.arange(top.shape[1]) - (top.shape[1] - 1) / 2
-    return np.asarray(np.einsum("p,tpx->tx", share, top))
+    slope = np.einsum("p,tpx->tx", share, top)
+    return np.asarray(slope / np.linalg.norm(slope, axis=1, keepdims=True))
 
 
 def _rising(clock: FloatArray, poses: FloatArray, path: Path) -> tuple[FloatArray, FloatArray]:

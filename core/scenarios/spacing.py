@@ -1,0 +1,122 @@
+"""Where the markers of a flat sheet sit, told by how far apart they are seen."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..body import Body
+from ..errors import InputError
+from ..measurement import Recording, check_spatial
+
+#: Markers are neighbours up to so many times the usual distance of the nearest one: on a grid, two lines away.
+_NEIGHBOURS = 2.2
+#: A distance is known to this share of that usual distance, a place that was given beforehand to that one.
+_DISTANCE_SD, _PLACE_SD = 0.07, 0.5
+#: Fewer frames of a pair of markers tell nothing of their distance.
+_FEWEST = 10
+_ROUNDS = 20
+#: A sheet is flat if no vertex is further from its plane than this share of its size.
+_FLAT = 1e-6
+
+
+def told_places(body: Body, markers: FloatArray, recordings: Sequence[Recording]) -> FloatArray:
+    """Marker weights ``(M, V)`` as ``markers``, of places on the sheet that go with the distances that are seen.
+
+    A sheet hardly stretches, so that neighbouring markers stay as far apart as they are on it, whatever it does; where
+    it is bent they come a little nearer, in each way for some of the time. So those places on the flat sheet are taken
+    whose distances fit the medians over all frames best, near those that ``markers`` gives (which alone say how the
+    whole lies on the sheet): least squares by Gauss-Newton steps, as in metric multidimensional scaling (Borg and
+    Groenen, *Modern Multidimensional Scaling*, 2005). A marker that would come to sit beside the sheet sits at its
+    edge. Nothing is simulated.
+
+    Args:
+        body: a flat sheet.
+        markers: weights ``(M, V)`` of where they are said to be.
+        recordings: of these markers.
+
+    Raises:
+        InputError: not a flat sheet, points in pixels or without correspondence, or too few frames.
+    """
+    plane = _plane(body)
+    flat = (body.vertices - body.vertices[0]) @ plane.T
+    given = markers @ flat
+    for recording in recordings:
+        check_spatial(recording)
+        if not recording.series.correspondence or recording.series.points.shape[1] != len(given):
+            raise InputError(
+                f"[scenario] spacing = 'measured' is for points that are followed, {len(given)} of them here, but "
+                f"recording {recording.name!r} has {recording.series.points.shape[1]}"
+                f"{'' if recording.series.correspondence else ' without correspondence'}; leave spacing out"
+            )
+    away = np.linalg.norm(given[:, None] - given[None], axis=2)
+    usual = float(np.median(np.min(np.where(away > 0, away, np.inf), axis=1)))
+    pairs = np.argwhere(np.triu((away > 0) & (away < _NEIGHBOURS * usual)))
+    apart, seen = _distances(recordings, pairs)
+    told = seen >= _FEWEST
+    if not told.any():
+        raise InputError(
+            f"[scenario] spacing = 'measured' tells from frames that show neighbouring markers, but no pair of them is "
+            f"seen in {_FEWEST} frames of {', '.join(r.name for r in recordings)}; leave spacing out"
+        )
+    places = _nearest_layout(given, pairs[told], apart[told], usual)
+    return _weights(flat, body.triangles, places)
+
+
+def _plane(body: Body) -> FloatArray:
+    """Two axes ``(2, 3)`` of the plane that a sheet lies in at rest."""
+    if body.kind == "cloth":
+        _, sizes, axes = np.linalg.svd(body.vertices - body.vertices.mean(axis=0), full_matrices=False)
+        if sizes[2] <= _FLAT * sizes[0]:
+            return np.asarray(axes[:2])
+    raise InputError(
+        "[scenario] spacing = 'measured' is for a cloth that is flat at rest, but this is "
+        f"{'a cloth of another shape' if body.kind == 'cloth' else f'a {body.kind}'}; leave it out"
+    )
+
+
+def _distances(recordings: Sequence[Recording], pairs: IntArray) -> tuple[FloatArray, IntArray]:
+    """Medians of how far the markers of each pair are apart [m], NaN where never, and in how many frames."""
+    series = [r.series.points for r in recordings]
+    both = [np.linalg.norm(p[:, pairs[:, 0]] - p[:, pairs[:, 1]], axis=2) for p in series]
+    whole = np.concatenate(both)
+    seen = np.isfinite(whole).sum(axis=0)
+    apart = np.full(len(pairs), np.nan)
+    apart[seen > 0] = np.nanmedian(whole[:, seen > 0], axis=0)
+    return apart, seen
+
+
+def _nearest_layout(given: FloatArray, pairs: IntArray, apart: FloatArray, usual: float) -> FloatArray:
+    """Places ``(M, 2)`` near ``given (M, 2)`` whose distances are nearest to ``apart``."""
+    count, row = len(given), np.arange(len(pairs))
+    places = given.copy()
+    for _ in range(_ROUNDS):
+        between = places[pairs[:, 0]] - places[pairs[:, 1]]
+        now = np.maximum(np.linalg.norm(between, axis=1), 1e-12)
+        slope = np.zeros((len(pairs), count, 2))
+        slope[row, pairs[:, 0]] = between / now[:, None]
+        slope[row, pairs[:, 1]] = -slope[row, pairs[:, 0]]
+        rows = slope.reshape(len(pairs), -1) / (_DISTANCE_SD * usual)
+        left = (apart - now) / (_DISTANCE_SD * usual)
+        normal = rows.T @ rows + np.eye(2 * count) / (_PLACE_SD * usual) ** 2
+        pull = rows.T @ left + (given - places).ravel() / (_PLACE_SD * usual) ** 2
+        step = np.linalg.solve(normal, pull).reshape(count, 2)
+        places = places + step
+        if np.abs(step).max() < 1e-6 * usual:
+            break
+    return places
+
+
+def _weights(flat: FloatArray, triangles: IntArray, places: FloatArray) -> FloatArray:
+    """Weights ``(M, V)`` of the corners of the triangle that each place is in, or is beside by the least share."""
+    corners = flat[triangles]
+    across = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    inverse = np.linalg.inv(across)
+    weights = np.zeros((len(places), len(flat)))
+    for m, place in enumerate(places):
+        two = np.einsum("fij,fj->fi", inverse, place - corners[:, 0])
+        shares = np.concatenate([1.0 - two.sum(axis=1, keepdims=True), two], axis=1)
+        best = int(np.argmax(shares.min(axis=1)))
+        inside = np.maximum(shares[best], 0.0)
+        weights[m, triangles[best]] = inside / inside.sum()
+    return weights
