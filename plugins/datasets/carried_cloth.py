@@ -23,6 +23,8 @@ X = np.array([1.0, 0.0, 0.0])
 LAGS = np.arange(-0.6, 0.6001, 0.01)
 #: Hand and cloth must correlate this much at some lag [1].
 ALIKE = 0.8
+#: An edge that leans more than this is worth a word [degrees].
+LEANS = 1.0
 #: What goes no farther than this about its middle, root mean square, rests [m].
 RESTS = 0.005
 
@@ -32,10 +34,11 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
 
     Points are in the order of the vertices of a hanging cloth: row by row from the held top edge, which is the last
     index of axis 2 in the file, along x. The gripper is the middle of the top edge and turns with the hand: where it is
-    in the hand is the median over the recording, in which a constant offset between camera and robot goes too. The
-    camera's clock lags the robot's; the lag is the one at which the top edge moves most like the hand, and points are
-    given on the robot's clock; where the hand rests, the lag is taken for 0. Without ``tcp`` the tracked top edge
-    itself is the gripper. Frames in which the tracker lost the cloth (:mod:`.grid_faults`) are left out.
+    in the hand and which way the edge points are medians over the recording, in which a constant offset and turn
+    between camera and robot go, too. The camera's clock lags the robot's; the lag is the one at which the top edge
+    moves most like the hand, and points are given on the robot's clock; where the hand rests, the lag is taken for 0.
+    Without ``tcp`` the tracked top edge itself is the gripper. Frames in which the tracker lost the cloth
+    (:mod:`.grid_faults`) are left out.
 
     Takes with names alike are not marked as repeats: the robot did not start them at one moment, nor on one path.
 
@@ -91,6 +94,9 @@ def _recording(path: Path, name: str) -> Recording:
     held = np.median(rotate(in_hand, middle - then[:, :3]), axis=0)
     along = np.median(rotate(in_hand, _along(top[whole])), axis=0)
     leaning = carried_turns(along[None], X)[0]
+    degrees = float(np.degrees(np.arctan2(np.linalg.norm(along[1:]), along[0])))
+    if degrees > LEANS:
+        note(f"{name}: the held edge leans by {degrees:.1f} degrees in the hand; the gripper is turned so, too")
     poses = np.concatenate([hand[:, :3] + rotate(turns, held), multiply(turns, leaning)], axis=1)
     return Recording(name, PointSeries(time - lag, points), Motion(clock, poses[:, None]))
 

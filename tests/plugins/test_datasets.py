@@ -156,8 +156,8 @@ def test_takes_are_read_in_the_order_asked_for(tmp_path: Path) -> None:
     assert len(read("deform-cable", path)[0]) == 3
 
 
-def carried(lag: float, offset: Sequence[float], n: int = 5) -> dict[str, Any]:
-    """A rigid sheet under a hand that moves and tilts, seen late and aside by a camera."""
+def carried(lag: float, offset: Sequence[float], n: int = 5, lean: float = 0.0) -> dict[str, Any]:
+    """A rigid sheet under a hand that moves and tilts, seen late and aside by a camera. It leans about y."""
     clock, seen = np.arange(0, 6, 0.05), np.arange(0.5, 5.5, 0.1)
 
     def hand(t: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
@@ -175,6 +175,7 @@ def carried(lag: float, offset: Sequence[float], n: int = 5) -> dict[str, Any]:
     then, its_turn = hand(seen - lag)
     grid = np.stack(np.meshgrid(np.linspace(-0.15, 0.15, n), np.linspace(-0.3, 0.0, n), indexing="ij"), axis=-1)
     local = np.stack([grid[..., 0], 0 * grid[..., 0], grid[..., 1] - 0.1], axis=-1).reshape(-1, 3)
+    local = rotate(np.array([np.cos(lean / 2), 0.0, np.sin(lean / 2), 0.0]), local)
     mesh = rotate(its_turn[:, None], np.broadcast_to(local, (len(seen), *local.shape))) + then[:, None]
     mesh = (mesh + np.array(offset)).reshape(len(seen), n, n, 3)
     return {"mesh": mesh, "t": seen, "tcp_t": clock, "tcp": np.concatenate([at, home[:, [1, 2, 3, 0]]], axis=1)}
@@ -196,6 +197,18 @@ def test_the_gripper_of_a_carried_cloth_is_its_top_edge(tmp_path: Path) -> None:
     down = rotate(pose[:, 3:], np.broadcast_to([0.0, 0.0, -0.3], (len(pose), 3)))
     sheet = take.series.points[:, -5:].mean(axis=1) - top.mean(axis=1)
     np.testing.assert_allclose(down, sheet, atol=0.005)  # it hangs where the hand points
+
+
+@pytest.mark.parametrize("lean", [-0.06, 0.006, 0.05])
+def test_a_carried_edge_may_lean_in_the_hand(tmp_path: Path, lean: float) -> None:
+    np.savez(tmp_path / "a.npz", **carried(0.31, (0.02, 0.0, 0.01), lean=lean))
+    (take,), notes = read("carried-cloth", tmp_path)
+    (said,) = [note for note in notes if "leans" in note] or [""]
+    assert f"leans by {np.degrees(abs(lean)):.1f} degrees in the hand" in said if abs(lean) > 0.02 else not said
+    assert take.gripper is not None
+    pose, top = take.gripper.at(take.series.time)[:, 0], take.series.points[:, :5]
+    along = rotate(pose[:, 3:], np.broadcast_to([0.3, 0.0, 0.0], (len(pose), 3)))
+    np.testing.assert_allclose(along, top[:, -1] - top[:, 0], atol=0.002)
 
 
 @pytest.mark.parametrize("axis", [1, 2])
