@@ -7,9 +7,12 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.differences import fourth_differences, robust_sd
+from ...core.errors import InputError
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
+from ...core.scenarios.spacing import told_places
 from ...core.scenarios.standoffs import standing_off
+from ...core.series import PointSeries
 from ...core.study import Problem, SimulationPool, Task
 from ..noise import Noise
 from ..residuals import rms_apart
@@ -19,6 +22,8 @@ from ..roughness import Roughness, roughness, unrepeatable
 STEP_MATTERS = 1.0
 #: Recordings that are left to chance are to be fitted in pieces of this length [s], or halves if they are shorter.
 PIECE = 1.25
+#: Markers of a cloth that sit further from where they are said to than this are told of, root mean square [m].
+ELSEWHERE = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -26,7 +31,8 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
 
     What a rollout does by chance tells nothing of the parameters. A motion that is rough at the frame rate passes for
     noise where the noise is estimated from roughness. What the time step does passes for the material's doing. Markers
-    beside the axis of a rope let it seem longer or shorter than it is, as it is bent.
+    beside the axis of a rope let it seem longer or shorter than it is, as it is bent, and those that sit elsewhere on a
+    cloth than they are said to pass for what it does.
     """
     problem = pool.problem
     values = space.as_dict(space.from_unit(unit))
@@ -49,7 +55,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
-    out += markers_beside(problem)
+    out += [*markers_beside(problem), *markers_elsewhere(problem, plain)]
     if noise.source.startswith("roughness"):
         own = robust_sd(fourth_differences(plain[problem.fit_on[0]].series.points))
         if own > 0.5 * noise.sd:
@@ -114,3 +120,39 @@ def markers_beside(problem: Problem) -> list[str]:
         f"the distances between markers change as the rope bends as if these stood {1e3 * away:.2g} mm beside its "
         'axis; [scenario] markers = "beside" takes them to be there'
     ]
+
+
+def markers_elsewhere(problem: Problem, plain: Mapping[str, Trajectory]) -> list[str]:
+    """That markers sit elsewhere on a flat cloth than the study says, in a sentence, by how far apart they are seen.
+
+    As far apart as in the model, whose cloth is bent and folded much the same, they are where they are said to be.
+
+    Args:
+        problem: of the study.
+        plain: what the model predicts where it fits best, by recording.
+    """
+    scenario = problem.scenarios[problem.fit_on[0]]
+    if not np.isin(scenario.markers, (0.0, 1.0)).all():  # tied to where they are seen, or placed by their distances
+        return []
+    measured = [problem.recordings[name] for name in problem.fit_on]
+    try:
+        seen = told_places(scenario.body, scenario.markers, measured)
+        made = [replace(r, series=_seen_alike(plain[r.name].series, r.series)) for r in measured]
+        away = np.linalg.norm(
+            (seen - told_places(scenario.body, scenario.markers, made)) @ scenario.body.vertices, axis=1
+        )
+    except InputError:  # not a flat cloth, or nothing followed
+        return []
+    rms, worst = float(np.sqrt(np.mean(away**2))), int(np.argmax(away))
+    if rms <= ELSEWHERE:
+        return []
+    return [
+        f"neighbouring markers are seen as far apart as if they sat {1e3 * rms:.2g} mm from where [scenario] markers "
+        f'puts them, marker {worst} {1e3 * away[worst]:.2g} mm; [scenario] spacing = "measured" places them by '
+        "these distances"
+    ]
+
+
+def _seen_alike(made: PointSeries, measured: PointSeries) -> PointSeries:
+    """What is simulated, in the frames in which it is measured."""
+    return replace(made, points=np.where(measured.valid[..., None], made.points, np.nan))

@@ -1,6 +1,8 @@
 """Where the markers of a sheet sit, told by their distances."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from muslin.core.scenario import marker_weights
 from muslin.core.scenarios.spacing import told_places
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
+from muslin.inference.sequential.doubts import markers_elsewhere
 
 SIZE, LINES = 0.3, 8
 
@@ -43,10 +46,10 @@ def seen(points: FloatArray, name: str = "take") -> Recording:
     return Recording(name, PointSeries(0.1 * np.arange(len(points)), points), Motion.still(1))
 
 
-def pulled_in(flat: FloatArray) -> FloatArray:
-    """A grid whose corners a tracker pulls in, by up to 12 mm a coordinate."""
+def pulled_in(flat: FloatArray, by: float = 0.012) -> FloatArray:
+    """A grid whose corners a tracker pulls in, each coordinate by so much [m]."""
     half = np.abs(flat).max(axis=0)
-    return flat - np.sign(flat) * 0.012 * (np.abs(flat) / half) ** 4 * ((np.abs(flat) / half) ** 4)[:, ::-1]
+    return flat - np.sign(flat) * by * (np.abs(flat) / half) ** 4 * ((np.abs(flat) / half) ** 4)[:, ::-1]
 
 
 def flat_of(body: Body) -> FloatArray:
@@ -101,6 +104,27 @@ def test_what_tells_nothing_is_refused() -> None:
     rolled = Body("cloth", bent(flat_of(body), 1, 0)[0], body.elements)
     with pytest.raises(InputError, match="this is a cloth of another shape; leave it out"):
         told_places(rolled, eye, [seen(points)])
+
+
+@pytest.mark.parametrize(("told", "pulled"), [("all", True), ("all", False), ("spaced", True)])
+def test_a_fit_tells_of_markers_that_sit_elsewhere(tmp_path: Path, told: str, pulled: bool) -> None:
+    pytest.importorskip("mujoco")
+    scenario = {"all": 'markers = "all"', "spaced": 'spacing = "measured"'}
+    problem = Study.load(study(tmp_path, scenario[told])).problem
+    flat, take = flat_of(sheet()), problem.recordings["a"]
+    true = pulled_in(flat, 0.03) if pulled else flat
+    measured = replace(take, series=replace(take.series, points=bent(true, 30, 5, noise=0.002)))
+    problem = replace(problem, recordings={**problem.recordings, "a": measured})
+    plain = SimpleNamespace(series=PointSeries(take.series.time, bent(flat, 30, 6)))  # it does something else
+    said = markers_elsewhere(problem, {"a": plain})  # type: ignore[dict-item]
+    if told != "all" or not pulled:
+        assert said == []
+        return
+    (text,) = said
+    away = np.linalg.norm(true - flat, axis=1)
+    worst = float(text.split("marker")[-1].split(" mm;")[0].split()[-1])
+    assert worst == pytest.approx(1e3 * away.max(), abs=2.0)
+    assert 'spacing = "measured" places them' in text
 
 
 def study(folder: Path, scenario: str) -> Path:
