@@ -19,11 +19,14 @@ from ..core.store import write_text
 from ..core.study import build_problem, parse_config
 from ..core.study.objects import grasps_of, object_of
 from .console import command, next_step, say
+from .gridding import Grid, laid_over, seen_grid
 from .output import check_output
 from .placing import doubtful_starts, parse_markers, place_markers
 from .study_file import study_text
 from .study_plan import Plan
 
+#: A cloth that is larger or smaller than this share of another is not of its size.
+_OTHER = 0.1
 Number = TypeVar("Number", int, float)
 
 
@@ -112,7 +115,13 @@ def new(
         table["vertices"] = _numbers(vertices, int, "--vertices")
     if grasp_points.strip():
         table["grasp_points"] = _points(grasp_points)
-    whole = {"study": {"measurement": ""}, "scenario": table, "simulator": {"name": simulator}}
+    whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
+    told = (
+        any(text.strip() for text in (vertices, grasp_points, points, markers)) or mesh or _found_by(measurement, study)
+    )
+    grid = None if told else _grid(whole, measured, study, bool(sizes))
+    if grid is not None:
+        table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
     own = parse_config(whole, str(study)).scenario
     body = object_of(own, study.parent)
     plan = Plan(
@@ -130,11 +139,14 @@ def new(
         mesh_scale=mesh_scale,
         grasp_points=table.get("grasp_points"),
         points=_numbers(points, int, "--points") or None,
-        markers=parse_markers(markers),
+        markers=parse_markers(markers) if grid is None else grid.markers,
         extractor=_found_by(measurement, study),
+        spacing="measured" if grid is not None and grid.uneven else None,
     )
     remarks: list[str] = []
-    if plan.extractor is None:
+    if grid is not None:
+        remarks = [grid.text(sized=table["size"] != grid.size)]
+    elif plan.extractor is None:
         plan, remarks = place_markers(plan, measured, study, body, sized=bool(sizes))
     elif markers.strip():
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
@@ -152,6 +164,24 @@ def new(
     for remark in remarks:
         say(f"  {remark}")
     next_step(command("fit", study), note="look through the study file first")
+
+
+def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool) -> Grid | None:
+    """The grid that the points are, if they lie as its vertices do and it is as large as the person says it is."""
+    size = whole["scenario"]["size"]
+    if len(size) != 2 or (grid := seen_grid([measured[name] for name in whole["study"]["fit_on"]])) is None:
+        return None
+    if sized and _other(grid.size, size):
+        return None
+    table = whole["scenario"] | {"vertices": grid.counts, "markers": grid.markers}
+    table |= {"size": grid.size} if _other(grid.size, size) else {}
+    draft = parse_config(whole | {"scenario": table}, str(study))
+    return laid_over(grid, build_problem(draft, measured, study.parent))
+
+
+def _other(size: list[float], usual: list[float]) -> bool:
+    """Whether a cloth that seems ``size`` [m] large is not one of the ``usual`` size."""
+    return any(abs(a - b) > _OTHER * b for a, b in zip(size, usual, strict=True))
 
 
 def _from(study: Path, file: Path) -> str:

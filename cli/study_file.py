@@ -88,16 +88,6 @@ def _scenario(plan: Plan) -> str:
     )
 
 
-_SPACING = {
-    "cloth": [
-        "# Markers of a flat cloth whose places on it are not known well: as far apart as they are seen to be.",
-        '# spacing = "measured"',
-    ],
-    "rope": [],
-    "solid": [],
-}
-
-
 def _placed(plan: Plan) -> list[str]:
     return [
         '# The frame of the object: "gripper" (of the first gripper at its first pose), "upright" (from that',
@@ -106,7 +96,14 @@ def _placed(plan: Plan) -> list[str]:
         '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
         '# first frame), "surface" (anywhere: clouds), or a vertex number for each.',
         f"markers = {_value(plan.markers)}",
-        *_SPACING[plan.kind],
+        *(_spacing(plan) if plan.kind == "cloth" else []),
+    ]
+
+
+def _spacing(plan: Plan) -> list[str]:
+    return [
+        "# Markers of a flat cloth that are not quite where markers says: as far apart as they are seen.",
+        f'{"" if plan.spacing else "# "}spacing = "measured"',
     ]
 
 

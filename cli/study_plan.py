@@ -27,6 +27,7 @@ class Plan:
         markers: where they sit: ``"all"``, ``"bound"``, vertex numbers; None while undecided.
         extractor: name and options of what found the points in pictures, or None where they were measured.
         start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
+        spacing: ``"measured"`` where the markers sit as far apart as they are seen, not where their vertices are.
         near: how near the model is meant to come [m], None for as near as the noise lets it.
     """
 
@@ -47,6 +48,7 @@ class Plan:
     markers: str | list[int] | None
     extractor: dict[str, Any] | None = None
     start: str | None = None
+    spacing: str | None = None
     near: float | None = None
 
     @property

@@ -8,6 +8,7 @@ from ..arrays import FloatArray, IntArray
 from ..body import Body
 from ..errors import InputError
 from ..measurement import Recording, check_spatial
+from ..scenario import Scenario
 
 #: Markers are neighbours up to so many times the usual distance of the nearest one: on a grid, two lines away.
 _NEIGHBOURS = 2.2
@@ -18,6 +19,14 @@ _FEWEST = 10
 _ROUNDS = 20
 #: A sheet is flat if no vertex is further from its plane than this share of its size.
 _FLAT = 1e-6
+#: Markers that sit further than this from where they are said to are worth a word, root mean square [m].
+MATTERS = 0.005
+
+
+def off_places(scenario: Scenario, recordings: Sequence[Recording]) -> FloatArray:
+    """How far the markers of a flat sheet sit from where ``scenario`` says, by :func:`told_places` ``(M, 3)`` [m]."""
+    told = told_places(scenario.body, scenario.markers, recordings)
+    return np.asarray((told - scenario.markers) @ scenario.body.vertices)
 
 
 def told_places(body: Body, markers: FloatArray, recordings: Sequence[Recording]) -> FloatArray:

@@ -10,7 +10,7 @@ from ...core.differences import fourth_differences, robust_sd
 from ...core.errors import InputError
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
-from ...core.scenarios.spacing import told_places
+from ...core.scenarios.spacing import MATTERS, off_places
 from ...core.scenarios.standoffs import standing_off
 from ...core.series import PointSeries
 from ...core.study import Problem, SimulationPool, Task
@@ -22,8 +22,6 @@ from ..roughness import Roughness, roughness, unrepeatable
 STEP_MATTERS = 1.0
 #: Recordings that are left to chance are to be fitted in pieces of this length [s], or halves if they are shorter.
 PIECE = 1.25
-#: Markers of a cloth that sit further from where they are said to than this are told of, root mean square [m].
-ELSEWHERE = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -136,15 +134,13 @@ def markers_elsewhere(problem: Problem, plain: Mapping[str, Trajectory]) -> list
         return []
     measured = [problem.recordings[name] for name in problem.fit_on]
     try:
-        seen = told_places(scenario.body, scenario.markers, measured)
+        seen = off_places(scenario, measured)
         made = [replace(r, series=_seen_alike(plain[r.name].series, r.series)) for r in measured]
-        away = np.linalg.norm(
-            (seen - told_places(scenario.body, scenario.markers, made)) @ scenario.body.vertices, axis=1
-        )
+        away = np.linalg.norm(seen - off_places(scenario, made), axis=1)
     except InputError:  # not a flat cloth, or nothing followed
         return []
     rms, worst = float(np.sqrt(np.mean(away**2))), int(np.argmax(away))
-    if rms <= ELSEWHERE:
+    if rms <= MATTERS:
         return []
     return [
         f"neighbouring markers are seen as far apart as if they sat {1e3 * rms:.2g} mm from where [scenario] markers "
