@@ -11,7 +11,7 @@ import real
 import real_measures
 import zarr
 from real import COLUMNS, TITLES, joined, markdown, rms
-from real_cases import BEAM, BEAM_TAKES, CASES, Case, on_pybullet, spread, start_speed
+from real_cases import BEAM_TAKES, BEAMS, CASES, Case, on_pybullet, spread, start_speed
 from real_measures import bootstrap, measures, to_surface, within
 
 from muslin.core.body import cloth_grid
@@ -208,7 +208,7 @@ def test_what_a_compared_study_is_off_is_measured_on_held_out_takes(monkeypatch:
 def test_a_set_can_be_tried_on_the_other_engine(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "other").mkdir()
-    mine, other = BEAM.make(tmp_path / "mine", 1), on_pybullet(BEAM).make(tmp_path / "other", 1)
+    mine, other = BEAMS[0].make(tmp_path / "mine", 1), on_pybullet(BEAMS[0]).make(tmp_path / "other", 1)
     assert (mine.config.simulator.name, other.config.simulator.name) == ("mujoco", "pybullet")
     assert mine.problem.fit_on == other.problem.fit_on == ("gravity-b",)
     assert set(other.problem.hold_out) == set(BEAM_TAKES[1:])
