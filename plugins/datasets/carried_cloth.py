@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,8 @@ LAGS = np.arange(-0.6, 0.6001, 0.01)
 ALIKE = 0.8
 #: An edge that leans more than this is worth a word [degrees].
 LEANS = 1.0
+#: Frames are stamped late if that leaves so much of what hand and edge are unlike in.
+CLEARLY = 0.99
 #: What goes no farther than this about its middle, root mean square, rests [m].
 RESTS = 0.005
 
@@ -37,6 +40,8 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
     in the hand and which way the edge points are medians over the recording, in which a constant offset and turn
     between camera and robot go, too. The camera's clock lags the robot's; the lag is the one at which the top edge
     moves most like the hand, and points are given on the robot's clock; where the hand rests, the lag is taken for 0.
+    A tracker may stamp a frame as it is done with it, so that a frame that took long was seen long before its stamp:
+    where the top edge moves more like the hand with the stamps of the frames before, those are taken.
     Without ``tcp`` the tracked top edge itself is the gripper. Frames in which the tracker lost the cloth
     (:mod:`.grid_faults`) are left out.
 
@@ -61,12 +66,13 @@ def _recording(path: Path, name: str) -> Recording:
     if mesh.shape[1] != mesh.shape[2] or mesh.shape[1] < 2:
         raise InputError(f"{path}: mesh must be (T, n, n, 3) with n from 2 up, but is {mesh.shape}")
     grid = np.where(np.isfinite(mesh), mesh, np.nan)[:, :, ::-1].transpose(0, 2, 1, 3)
+    begun = _begun(time)
     lost = lost_cloth(grid)
     if lost.any():
         note(
             f"{name}: {int(lost.sum())} of {len(lost)} frames left out, in which the grid is too short to be the cloth"
         )
-    time, points = time[~lost], grid[~lost].reshape(int(np.sum(~lost)), -1, 3)
+    time, begun, points = time[~lost], begun[~lost], grid[~lost].reshape(int(np.sum(~lost)), -1, 3)
     top = points[:, : mesh.shape[1]]
     whole = np.isfinite(top).all(axis=(1, 2))
     if whole.sum() < 10:
@@ -81,15 +87,19 @@ def _recording(path: Path, name: str) -> Recording:
         raise InputError(f"{path} has tcp but no tcp_t (K,), the times of its poses [s]; add it, or leave tcp out")
     hand = shaped(data["tcp"], (None, 7), "tcp", path)
     clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand, path)
-    lag = camera_lag(time[whole], middle, clock, hand[:, :3])
-    if lag is None:
-        lag = 0.0
+    found = [camera_lag(stamps[whole], middle, clock, hand[:, :3]) for stamps in (time, begun)]
+    if found[0] is None or found[1] is None:
+        taken = time
         note(f"{name}: the hand rests, so how much the camera lags does not show; it is taken for 0 s")
     else:
-        note(f"{name}: the camera lags the robot by {lag:.2f} s; points are on the robot's clock")
+        done, early = found
+        late = 1 - early.alike < CLEARLY * (1 - done.alike)
+        taken = begun - early.lag if late else time - done.lag
+        behind = f"{np.median(time - taken):.2f} s{', more after a pause' if late else ''}"
+        note(f"{name}: the camera lags the robot by {behind}; points are on the robot's clock")
     turns = multiply(hand[:, [6, 3, 4, 5]], inverse(HOME))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
-    then = Motion(clock, np.concatenate([hand[:, :3], turns], axis=1)[:, None]).at(time[whole] - lag)[:, 0]
+    then = Motion(clock, np.concatenate([hand[:, :3], turns], axis=1)[:, None]).at(taken[whole])[:, 0]
     in_hand = inverse(then[:, 3:])
     held = np.median(rotate(in_hand, middle - then[:, :3]), axis=0)
     along = np.median(rotate(in_hand, _along(top[whole])), axis=0)
@@ -98,11 +108,28 @@ def _recording(path: Path, name: str) -> Recording:
     if degrees > LEANS:
         note(f"{name}: the held edge leans by {degrees:.1f} degrees in the hand; the gripper is turned so, too")
     poses = np.concatenate([hand[:, :3] + rotate(turns, held), multiply(turns, leaning)], axis=1)
-    return Recording(name, PointSeries(time - lag, points), Motion(clock, poses[:, None]))
+    return Recording(name, PointSeries(taken, points), Motion(clock, poses[:, None]))
 
 
-def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> float | None:
-    """How much later the camera stamps what the hand does [s]: where their displacements correlate most.
+def _begun(stamps: FloatArray) -> FloatArray:
+    """When work on each frame began, if each is stamped as it is done and the next is begun: at the stamp before."""
+    return np.concatenate([stamps[:1] - np.median(np.diff(stamps)), stamps[:-1]])
+
+
+class Lag(NamedTuple):
+    """How much later a camera stamps what a hand does.
+
+    Args:
+        lag: [s].
+        alike: correlation of their displacements there [1].
+    """
+
+    lag: float
+    alike: float
+
+
+def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> Lag | None:
+    """How much later the camera stamps what the hand does: where their displacements correlate most.
 
     None where both rest and nothing tells.
 
@@ -131,7 +158,8 @@ def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: Floa
             "leave them out, and the tracked top edge is the gripper"
         )
     below, at, above = score[best - 1 : best + 2]
-    return float(LAGS[best] + (LAGS[1] - LAGS[0]) * 0.5 * (below - above) / min(below - 2 * at + above, -1e-12))
+    top = 0.5 * (below - above) / min(below - 2 * at + above, -1e-12)
+    return Lag(float(LAGS[best] + (LAGS[1] - LAGS[0]) * top), float(at))
 
 
 def _spread(path: FloatArray) -> float:

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_datasets import carried, read, save_cable, swinging_cable
+from carried_sheet import carried
+from test_datasets import read, save_cable, swinging_cable
 
 from muslin.core.errors import InputError
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from carried_sheet import carried
 from published import ROOT
 
 from muslin.core.dataset import DatasetNote, cropped
@@ -154,91 +155,6 @@ def test_takes_are_read_in_the_order_asked_for(tmp_path: Path) -> None:
     assert [t.name for t in takes] == ["c", "a"]
     assert takes[0].series.points[0, 0, 0] > takes[1].series.points[0, 0, 0] + 1.5
     assert len(read("deform-cable", path)[0]) == 3
-
-
-def carried(lag: float, offset: Sequence[float], n: int = 5, lean: float = 0.0) -> dict[str, Any]:
-    """A rigid sheet under a hand that moves and tilts, seen late and aside by a camera. It leans about y."""
-    clock, seen = np.arange(0, 6, 0.05), np.arange(0.5, 5.5, 0.1)
-
-    def hand(t: np.ndarray[Any, Any]) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]]:
-        at = np.stack([0.1 * np.sin(1.3 * t), -0.4 + 0.08 * np.sin(2.1 * t), 0.35 + 0.05 * np.cos(1.7 * t)], axis=1)
-        a = 0.15 * np.sin(1.1 * t)  # about x, before the home orientation
-        return at, np.stack([np.cos(a), np.sin(a), 0 * a, 0 * a], axis=1)
-
-    def times_home(q: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        w, x = q[:, 0], q[:, 1]
-        s = 0.5**0.5  # (w, x, 0, 0) * (0, s, s, 0)
-        return np.stack([-x * s, w * s, w * s, x * s], axis=1)
-
-    at, turn = hand(clock)
-    home = times_home(turn)
-    then, its_turn = hand(seen - lag)
-    grid = np.stack(np.meshgrid(np.linspace(-0.15, 0.15, n), np.linspace(-0.3, 0.0, n), indexing="ij"), axis=-1)
-    local = np.stack([grid[..., 0], 0 * grid[..., 0], grid[..., 1] - 0.1], axis=-1).reshape(-1, 3)
-    local = rotate(np.array([np.cos(lean / 2), 0.0, np.sin(lean / 2), 0.0]), local)
-    mesh = rotate(its_turn[:, None], np.broadcast_to(local, (len(seen), *local.shape))) + then[:, None]
-    mesh = (mesh + np.array(offset)).reshape(len(seen), n, n, 3)
-    return {"mesh": mesh, "t": seen, "tcp_t": clock, "tcp": np.concatenate([at, home[:, [1, 2, 3, 0]]], axis=1)}
-
-
-def test_the_gripper_of_a_carried_cloth_is_its_top_edge(tmp_path: Path) -> None:
-    lag = 0.31
-    made = carried(lag, (-0.029, -0.005, 0.0))
-    np.savez(tmp_path / "s_rep1.npz", **made)
-    (take,), notes = read("carried-cloth", tmp_path)
-    assert take.name == take.motion == "s_rep1" and "lags the robot by 0.31 s" in notes[0]
-    assert take.gripper is not None
-    np.testing.assert_allclose(take.series.time, made["t"] - lag, atol=0.01)
-    top = take.series.points[:, :5]
-    assert (top[..., 2].mean(axis=1) > take.series.points[:, -5:, 2].mean(axis=1) + 0.2).all()  # row 0 is held
-    assert (np.diff(top[..., 0], axis=1) > 0).all()
-    pose = take.gripper.at(take.series.time)[:, 0]
-    np.testing.assert_allclose(pose[:, :3], top.mean(axis=1), atol=0.004)
-    down = rotate(pose[:, 3:], np.broadcast_to([0.0, 0.0, -0.3], (len(pose), 3)))
-    sheet = take.series.points[:, -5:].mean(axis=1) - top.mean(axis=1)
-    np.testing.assert_allclose(down, sheet, atol=0.005)  # it hangs where the hand points
-
-
-@pytest.mark.parametrize("lean", [-0.06, 0.006, 0.05])
-def test_a_carried_edge_may_lean_in_the_hand(tmp_path: Path, lean: float) -> None:
-    np.savez(tmp_path / "a.npz", **carried(0.31, (0.02, 0.0, 0.01), lean=lean))
-    (take,), notes = read("carried-cloth", tmp_path)
-    (said,) = [note for note in notes if "leans" in note] or [""]
-    assert f"leans by {np.degrees(abs(lean)):.1f} degrees in the hand" in said if abs(lean) > 0.02 else not said
-    assert take.gripper is not None
-    pose, top = take.gripper.at(take.series.time)[:, 0], take.series.points[:, :5]
-    along = rotate(pose[:, 3:], np.broadcast_to([0.3, 0.0, 0.0], (len(pose), 3)))
-    np.testing.assert_allclose(along, top[:, -1] - top[:, 0], atol=0.002)
-
-
-@pytest.mark.parametrize("axis", [1, 2])
-def test_frames_in_which_the_tracker_lost_a_cloth_are_left_out(tmp_path: Path, axis: int) -> None:
-    made = carried(0.31, (0.0, 0.0, 0.0))
-    mesh = made["mesh"]
-    squeezed = [7, 8, 30]
-    middle = mesh[squeezed].mean(axis=axis, keepdims=True)
-    mesh[squeezed] = middle + 0.85 * (mesh[squeezed] - middle)
-    mesh[12, 2, 2] = np.nan  # what is not seen is not short
-    # rolled to a tube of radius 1.5 spacings, a cloth is as long as ever
-    angle = np.linspace(-1.0, 1.0, 5) * 2 / 1.5
-    mesh[20, ..., 1] += np.broadcast_to(1.5 * 0.075 * np.cos(angle), (5, 5))
-    mesh[20, ..., 2] = mesh[20, ..., 2].mean() + 1.5 * 0.075 * np.sin(angle)
-    np.savez(tmp_path / "a.npz", **made)
-    (take,), notes = read("carried-cloth", tmp_path)
-    kept = np.setdiff1d(np.arange(50), squeezed)
-    assert "3 of 50 frames left out, in which the grid is too short to be the cloth" in notes[0]
-    np.testing.assert_allclose(take.series.time, made["t"][kept] - 0.31, atol=0.01)
-    assert take.series.points.shape == (47, 25, 3) and np.isnan(take.series.points).any(axis=2).sum() == 1
-
-
-def test_without_a_hand_the_tracked_edge_carries(tmp_path: Path) -> None:
-    made = carried(0.0, (0.0, 0.0, 0.0))
-    made["mesh"][7, 0, -1] = np.nan
-    np.savez(tmp_path / "a.npz", mesh=made["mesh"], t=made["t"])
-    (take,), notes = read("carried-cloth", tmp_path / "a.npz", "a")
-    assert "top edge is taken for the gripper" in notes[0] and take.gripper is not None
-    assert len(take.gripper.times) == len(take.series.time) - 1
-    np.testing.assert_allclose(take.gripper.poses[0, 0, :3], take.series.points[0, :5].mean(axis=0), atol=1e-9)
 
 
 def test_clouds_are_thinned_lose_what_stands_alone_and_skip_the_arm(tmp_path: Path) -> None:
