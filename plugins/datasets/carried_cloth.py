@@ -87,12 +87,11 @@ def _recording(path: Path, name: str) -> Recording:
         raise InputError(f"{path} has tcp but no tcp_t (K,), the times of its poses [s]; add it, or leave tcp out")
     hand = shaped(data["tcp"], (None, 7), "tcp", path)
     clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand, path)
-    found = [camera_lag(stamps[whole], middle, clock, hand[:, :3]) for stamps in (time, begun)]
-    if found[0] is None or found[1] is None:
+    done, early = (camera_lag(stamps[whole], middle, clock, hand[:, :3]) for stamps in (time, begun))
+    if done is None or early is None:
         taken = time
         note(f"{name}: the hand rests, so how much the camera lags does not show; it is taken for 0 s")
     else:
-        done, early = found
         late = 1 - early.alike < CLEARLY * (1 - done.alike)
         taken = begun - early.lag if late else time - done.lag
         behind = f"{np.median(time - taken):.2f} s{', more after a pause' if late else ''}"
