@@ -119,7 +119,7 @@ def new(
     told = (
         any(text.strip() for text in (vertices, grasp_points, points, markers)) or mesh or _found_by(measurement, study)
     )
-    grid = None if told else _grid(whole, measured, study, bool(sizes))
+    grid, remarks = (None, []) if told else _grid(whole, measured, study, bool(sizes))
     if grid is not None:
         table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
     own = parse_config(whole, str(study)).scenario
@@ -143,14 +143,12 @@ def new(
         extractor=_found_by(measurement, study),
         spacing="measured" if grid is not None and grid.uneven else None,
     )
-    remarks: list[str] = []
-    if grid is not None:
-        remarks = [grid.text(sized=table["size"] != grid.size)]
-    elif plan.extractor is None:
-        plan, remarks = place_markers(plan, measured, study, body, sized=bool(sizes))
-    elif markers.strip():
+    if grid is None and plan.extractor is None:
+        plan, placed = place_markers(plan, measured, study, body, sized=bool(sizes))
+        remarks += placed
+    elif grid is None and markers.strip():
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
-    else:
+    elif grid is None:
         plan = replace(plan, markers="all")
     text = study_text(plan)
     problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
@@ -166,17 +164,20 @@ def new(
     next_step(command("fit", study), note="look through the study file first")
 
 
-def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool) -> Grid | None:
-    """The grid that the points are, if they lie as its vertices do and it is as large as the person says it is."""
+def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool) -> tuple[Grid | None, list[str]]:
+    """The grid that the points are, if they lie as its vertices do and it is as large as the person says; remarks."""
     size = whole["scenario"]["size"]
     if len(size) != 2 or (grid := seen_grid([measured[name] for name in whole["study"]["fit_on"]])) is None:
-        return None
-    if sized and _other(grid.size, size):
-        return None
+        return None, []
+    other = _other(grid.size, size)
+    if sized and other:
+        seems = f"{grid.size[0]:g} x {grid.size[1]:g} m"
+        return None, [f"warning: by how far apart the points are, they are a grid over {seems}; check --size"]
     table = whole["scenario"] | {"vertices": grid.counts, "markers": grid.markers}
-    table |= {"size": grid.size} if _other(grid.size, size) else {}
+    table |= {"size": grid.size} if other else {}
     draft = parse_config(whole | {"scenario": table}, str(study))
-    return laid_over(grid, build_problem(draft, measured, study.parent))
+    laid = laid_over(grid, build_problem(draft, measured, study.parent))
+    return laid, [] if laid is None else [laid.text(sized=not other)]
 
 
 def _other(size: list[float], usual: list[float]) -> bool:

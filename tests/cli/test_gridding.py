@@ -98,5 +98,7 @@ def test_what_a_person_says_or_another_order_comes_first(tmp_path: Path, case: s
     points, arguments = sheet(8, 8, 0.3, 0.3), {"size": ("--size", "0.5,0.5"), "told": ("--vertices", "9,9")}
     if case == "rows":  # from the bottom edge
         points = points.reshape(-1, 8, 8, 3)[:, ::-1].reshape(points.shape)
-    assert "are a grid" not in new(tmp_path, points, *arguments.get(case, ()))
+    said = new(tmp_path, points, *arguments.get(case, ()))
+    assert "are a grid of" not in said
+    assert ("are a grid over 0.3" in said and "check --size" in said) == (case == "size")
     assert read_config(tmp_path / "study.toml").scenario.vertices != [8, 8]
