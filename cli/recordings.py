@@ -223,7 +223,10 @@ def _of_dataset(
 ) -> list[Recording]:
     """Takes of a published set, cropped; what its reader left out is said."""
     if len(files) != 1:
-        raise InputError(f"--dataset reads one file or folder, but {len(files)} are named; import them one by one")
+        raise InputError(
+            f"--dataset reads one file or folder, but {len(files)} are named: {', '.join(map(str, files))}; import "
+            "them one by one, and say --take before each take of one"
+        )
     read: Dataset = REGISTRY.get("dataset", name)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DatasetNote)

@@ -41,6 +41,10 @@ def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path) -> None:
         (["--dataset", "balls", "--up", "y"], "--up does not go with --dataset"),
         (["--take", "golf-ball-1"], "say which set with --dataset"),
         (
+            ["--dataset", "balls", "--take", "golf-ball-1", "golf-ball-2"],
+            "drops.csv, golf-ball-2; import them one by one",
+        ),
+        (
             ["--dataset", "balls", "--start", "1", "--start", "2"],
             "2 times for 22 takes; give it once, or once a take",
         ),
