@@ -12,7 +12,7 @@ from ..core.scenarios.spacing import MATTERS, off_places
 from ..core.study import Problem
 
 #: So many lines make a grid at least; so many vertices along each side make a mesh at least.
-_FEWEST_LINES, _FEWEST_VERTICES = 3, 7
+_FEWEST_LINES, _FEWEST_VERTICES = 3, 8
 #: So much of the distances between neighbours must be within so much of the usual one.
 _MOST, _ALIKE = 0.8, 0.2
 
@@ -49,7 +49,7 @@ class Grid:
     def text(self, sized: bool) -> str:
         """What was found, for a person, who has said how large the cloth is or not."""
         across, down = ((n - 1) // self.every + 1 for n in self.counts)
-        every = {1: "every", 2: "every other", 3: "every third"}[self.every]
+        every = {1: "every", 2: "every other", 3: "every third", 4: "every fourth"}[self.every]
         size = "" if sized else f", of a cloth of {self.size[0]:g} x {self.size[1]:g} m by how far apart they are"
         off = f"; they sit {1e3 * self.off:.2g} mm from the even places that they are given" if self.uneven else ""
         return (

@@ -41,7 +41,8 @@ def test_a_grid_is_seen_as_it_is(across: int, down: int, width: float, shape: fl
     points[3:9, ::5] = np.nan
     grid = seen_grid([take(points[:20]), take(points[20:], "two")])
     assert grid is not None
-    assert [(n - 1) // grid.every + 1 for n in grid.counts] == [across, down] and min(grid.counts) >= 7
+    assert [(n - 1) // grid.every + 1 for n in grid.counts] == [across, down] and min(grid.counts) >= 8
+    assert "vertex along both sides" in grid.text(sized=True)
     np.testing.assert_allclose(grid.size, [width, height], rtol=0.05)
     marked = np.arange(np.prod(grid.counts)) if grid.markers == "all" else np.array(grid.markers)
     places = np.stack(np.divmod(marked, grid.counts[0]), axis=1)
@@ -68,12 +69,12 @@ def new(folder: Path, points: FloatArray, *arguments: str) -> str:
 
 def test_a_tracked_grid_is_laid_over_the_mesh(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
-    even = sheet(8, 7, 0.42, 0.36)
+    even = sheet(8, 9, 0.42, 0.48)
     said = new(tmp_path, even)
-    assert "the 56 points are a grid of 8 x 7 on every vertex along both sides, of a cloth of 0.4" in said
+    assert "the 72 points are a grid of 8 x 9 on every vertex along both sides, of a cloth of 0.4" in said
     config = read_config(tmp_path / "study.toml").scenario
-    assert config.vertices == [8, 7] and config.markers == "all" and config.spacing is None
-    np.testing.assert_allclose(config.size or [], [0.42, 0.36], rtol=0.03)
+    assert config.vertices == [8, 9] and config.markers == "all" and config.spacing is None
+    np.testing.assert_allclose(config.size or [], [0.42, 0.48], rtol=0.03)
     problem = Study.load(tmp_path / "study.toml").problem
     scenario = problem.scenarios["one"]
     first = problem.recordings["one"].series.points[0]
