@@ -7,7 +7,7 @@ from ...core.errors import MuslinError
 from ...core.study.objects import object_of
 from ..adding import add_commands
 from .findings import Findings, number
-from .words import errors, length, sentence, words
+from .words import errors, fall, length, sentence, words
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def verdict(found: Findings) -> Verdict:
 def _diagnosed(found: Findings) -> Verdict:
     assert found.diagnose is not None
     result, e, file = found.diagnose, errors(found), found.study.path.name
-    before, after, noise = (length(e[k], e["unit"]) for k in ("before", "after", "noise"))
+    before, noise = (length(e[k], e["unit"]) for k in ("before", "noise"))
     effects = [str(n) for n in result.get("effects") or []]
     named = " and ".join(words(n) for n in effects)
     best = next((c for n in effects for c in found.candidates if c["name"] == n), None)
@@ -77,7 +77,7 @@ def _diagnosed(found: Findings) -> Verdict:
         detail = sentence(best, e["unit"], e["noise"], thing(found), errors=False)
     floor = f"noise {noise}"
     if result["verdict"] == "named":
-        drop = f"the {e['on']} error falls from {before} to {after} ({floor})"
+        drop = f"the {e['on']} error {fall(e['before'], e['after'], e['unit'])} ({floor})"
         if number(e["after"]) is None:
             drop = f"the {e['on']} error is {before} ({floor})"
         add = "" if found.after_inferred else add_commands(Path(file), effects)
@@ -91,7 +91,7 @@ def _diagnosed(found: Findings) -> Verdict:
         drop = f"The {e['on']} error is {before}, {floor}."
         if effects and number(e["after"]) is not None:
             within = _after(found, [effects[0], *beside])
-            drop = f"With {within}, the {e['on']} error falls from {before} to {after} ({floor})."
+            drop = f"With {within}, the {e['on']} error {fall(e['before'], e['after'], e['unit'])} ({floor})."
         add = "" if found.after_inferred or not effects else add_commands(Path(file), [effects[0], *beside])
         missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
         if beside:

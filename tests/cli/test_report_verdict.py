@@ -6,6 +6,8 @@ import pytest
 from made_up_study import make_study
 from report_page import page_of
 
+from muslin.cli.report.words import NBSP, fall
+
 
 @pytest.mark.parametrize(
     ("verdict", "says"),
@@ -49,3 +51,15 @@ def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tm
     group.attrs["result"] = {**group.attrs["result"], "verdict": verdict, **both}
     text = page_of(study, make_study(tmp_path, "fit", "compare", drag=True)).text
     assert "ith air drag, the" in text and "air drag and wind, the" not in text and "with them" not in text
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        (0.0519, 0.003, "falls from 52 mm to 3.0 mm"),
+        (0.01304, 0.0126, "falls from 13.0 mm to 12.6 mm"),
+        (0.013041, 0.013039, "stays at 13.0 mm"),
+    ],
+)
+def test_an_error_that_falls_by_little_is_told_to_a_tenth(before: float, after: float, said: str) -> None:
+    assert fall(before, after).replace(NBSP, " ") == said
