@@ -60,8 +60,8 @@ class Grid:
 def seen_grid(recordings: Sequence[Recording]) -> Grid | None:
     """The grid that the points of ``recordings`` are, or None.
 
-    Row by row, as neighbours along rows and columns are as far apart as one another, in all but the few that a
-    tracker pulls in at the edges.
+    Row by row, or column by column, as neighbours along rows and columns are as far apart as one another, in all but
+    the few that a tracker pulls in at the edges.
     """
     series = [r.series for r in recordings]
     count = series[0].points.shape[1]
@@ -84,26 +84,41 @@ def seen_grid(recordings: Sequence[Recording]) -> Grid | None:
 
 
 def laid_over(grid: Grid, problem: Problem) -> Grid | None:
-    """The grid with how far its points are from their vertices; None if these are numbered the other way round.
+    """The grid with how far its points are from their vertices; None if these are numbered some other way.
 
     Args:
         grid: that was seen.
         problem: of a study that has it.
     """
-    order = np.arange(problem.points_of(problem.fit_on[0])).reshape(-1, (grid.counts[0] - 1) // grid.every + 1)
-    away = np.zeros(4)
+    across = (grid.counts[0] - 1) // grid.every + 1
+    away = np.zeros(8)
     for name in problem.fit_on:
         scenario, first = problem.scenarios[name], problem.recordings[name].series.points[0]
-        places = scenario.markers @ scenario.start_vertices()
-        for k, numbers in enumerate((order, order[::-1], order[:, ::-1], order[::-1, ::-1])):
-            away[k] += np.nanmean(np.linalg.norm(first - places[numbers.ravel()], axis=1))
-    if np.argmin(away) > 0:
+        seen = np.isfinite(first).all(axis=1)
+        if seen.any():
+            places = (scenario.markers @ scenario.start_vertices()).reshape(-1, across, 3)
+            away += [np.mean(np.linalg.norm(first - other, axis=1)[seen]) for other in _numbered_otherwise(places)]
+    if not away.any() or np.argmin(away) > 0:
         return None
     try:
         off = off_places(problem.scenarios[problem.fit_on[0]], [problem.recordings[name] for name in problem.fit_on])
     except InputError:  # too few frames
         return grid
     return replace(grid, off=float(np.sqrt(np.mean(np.sum(off**2, axis=1)))))
+
+
+def _numbered_otherwise(places: FloatArray) -> list[FloatArray]:
+    """Where the points of a grid ``(R, C, 3)`` would be in all eight ways to number them; first as they are."""
+    down, across = places.shape[:2]
+    row, column = (v.ravel() for v in np.meshgrid(np.linspace(0, 1, down), np.linspace(0, 1, across), indexing="ij"))
+    made = []
+    for turned in (False, True):
+        a, b = (column, row) if turned else (row, column)
+        for u in (a, 1 - a):
+            for v in (b, 1 - b):
+                i, j = np.rint(u * (down - 1)).astype(int), np.rint(v * (across - 1)).astype(int)
+                made.append(places[i, j])
+    return made
 
 
 def _step(between: FloatArray) -> float | None:

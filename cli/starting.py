@@ -116,10 +116,9 @@ def new(
     if grasp_points.strip():
         table["grasp_points"] = _points(grasp_points)
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
-    told = (
-        any(text.strip() for text in (vertices, grasp_points, points, markers)) or mesh or _found_by(measurement, study)
-    )
-    grid, remarks = (None, []) if told else _grid(whole, measured, study, bool(sizes))
+    extractor = _found_by(measurement, study)
+    placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
+    grid, remarks = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
     if grid is not None:
         table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
     own = parse_config(whole, str(study)).scenario
@@ -140,12 +139,12 @@ def new(
         grasp_points=table.get("grasp_points"),
         points=_numbers(points, int, "--points") or None,
         markers=parse_markers(markers) if grid is None else grid.markers,
-        extractor=_found_by(measurement, study),
+        extractor=extractor,
         spacing="measured" if grid is not None and grid.uneven else None,
     )
     if grid is None and plan.extractor is None:
-        plan, placed = place_markers(plan, measured, study, body, sized=bool(sizes))
-        remarks += placed
+        plan, more = place_markers(plan, measured, study, body, sized=bool(sizes))
+        remarks += more
     elif grid is None and markers.strip():
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
     elif grid is None:

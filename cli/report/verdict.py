@@ -76,10 +76,10 @@ def _diagnosed(found: Findings) -> Verdict:
     if best is not None and result["verdict"] == "named":
         detail = sentence(best, e["unit"], e["noise"], thing(found), errors=False)
     floor = f"noise {noise}"
+    both = number(e["before"]), number(e["after"])
+    became = f"is {before}" if both[0] is None or both[1] is None else fall(both[0], both[1], e["unit"])
     if result["verdict"] == "named":
-        drop = f"the {e['on']} error {fall(e['before'], e['after'], e['unit'])} ({floor})"
-        if number(e["after"]) is None:
-            drop = f"the {e['on']} error is {before} ({floor})"
+        drop = f"the {e['on']} error {became} ({floor})"
         add = "" if found.after_inferred else add_commands(Path(file), effects)
         verb, it = ("are", "them") if len(effects) > 1 else ("is", "it")
         within = _after(found, effects)
@@ -91,7 +91,7 @@ def _diagnosed(found: Findings) -> Verdict:
         drop = f"The {e['on']} error is {before}, {floor}."
         if effects and number(e["after"]) is not None:
             within = _after(found, [effects[0], *beside])
-            drop = f"With {within}, the {e['on']} error {fall(e['before'], e['after'], e['unit'])} ({floor})."
+            drop = f"With {within}, the {e['on']} error {became} ({floor})."
         add = "" if found.after_inferred or not effects else add_commands(Path(file), [effects[0], *beside])
         missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
         if beside:

@@ -23,14 +23,15 @@ def length(value: Any, unit: str = "m") -> str:
     return f"{plain(x * factor)}{NBSP}{label}" if x is not None else "–"
 
 
-def fall(before: Any, after: Any, unit: str = "m") -> str:
-    """What became of an error, to a tenth where whole millimetres do not tell its two values apart."""
+def fall(before: float, after: float, unit: str = "m") -> str:
+    """What became of an error: it falls, rises or stays; to a tenth where whole millimetres do not tell."""
     told = [length(before, unit), length(after, unit)]
-    values = [x for x in (number(before), number(after)) if x is not None]
-    if told[0] == told[1] and values:
+    if told[0] == told[1]:
         factor, label = shown_unit(unit)
-        told = [f"{x * factor:.1f}{NBSP}{label}" for x in values]
-    return f"falls from {told[0]} to {told[-1]}" if told[0] != told[-1] else f"stays at {told[0]}"
+        told = [f"{x * factor:.1f}{NBSP}{label}" for x in (before, after)]
+    if told[0] == told[1]:
+        return f"stays at {told[0]}"
+    return f"{'rises' if after > before else 'falls'} from {told[0]} to {told[1]}"
 
 
 def plain(x: float) -> str:

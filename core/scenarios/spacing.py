@@ -97,19 +97,22 @@ def _distances(recordings: Sequence[Recording], pairs: IntArray) -> tuple[FloatA
 
 def _nearest_layout(given: FloatArray, pairs: IntArray, apart: FloatArray, usual: float) -> FloatArray:
     """Places ``(M, 2)`` near ``given (M, 2)`` whose distances are nearest to ``apart``."""
-    count, row = len(given), np.arange(len(pairs))
-    places = given.copy()
+    places, known, (one, other) = given.copy(), (_DISTANCE_SD * usual) ** -2, pairs.T
+    own = np.eye(2) * (_PLACE_SD * usual) ** -2
     for _ in range(_ROUNDS):
-        between = places[pairs[:, 0]] - places[pairs[:, 1]]
-        now = np.maximum(np.linalg.norm(between, axis=1), 1e-12)
-        slope = np.zeros((len(pairs), count, 2))
-        slope[row, pairs[:, 0]] = between / now[:, None]
-        slope[row, pairs[:, 1]] = -slope[row, pairs[:, 0]]
-        rows = slope.reshape(len(pairs), -1) / (_DISTANCE_SD * usual)
-        left = (apart - now) / (_DISTANCE_SD * usual)
-        normal = rows.T @ rows + np.eye(2 * count) / (_PLACE_SD * usual) ** 2
-        pull = rows.T @ left + (given - places).ravel() / (_PLACE_SD * usual) ** 2
-        step = np.linalg.solve(normal, pull).reshape(count, 2)
+        between = places[one] - places[other]
+        now = np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-12)
+        along = between / now
+        blocks = known * along[:, :, None] * along[:, None, :]
+        normal = np.zeros((len(given), len(given), 2, 2))
+        pull = (given - places) @ own
+        normal[np.arange(len(given)), np.arange(len(given))] = own
+        for k, at, sign in ((one, other, 1.0), (other, one, -1.0)):
+            np.add.at(normal, (k, k), blocks)
+            np.add.at(normal, (k, at), -blocks)
+            np.add.at(pull, k, sign * known * (apart[:, None] - now) * along)
+        matrix = normal.transpose(0, 2, 1, 3).reshape(given.size, given.size)
+        step = np.linalg.solve(matrix, pull.ravel()).reshape(given.shape)
         places = places + step
         if np.abs(step).max() < 1e-6 * usual:
             break
@@ -120,6 +123,9 @@ def _weights(flat: FloatArray, triangles: IntArray, places: FloatArray) -> Float
     """Weights ``(M, V)`` of the corners of the triangle that each place is in, or is beside by the least share."""
     corners = flat[triangles]
     across = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
+    area = np.abs(np.linalg.det(across))
+    real = area > 1e-9 * area.max()  # a sliver holds no place
+    corners, across, triangles = corners[real], across[real], triangles[real]
     inverse = np.linalg.inv(across)
     weights = np.zeros((len(places), len(flat)))
     for m, place in enumerate(places):

@@ -163,6 +163,11 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
                 f"[scenario] spacing = 'measured' is for markers, but extractor {config.extractor.name!r} finds points "
                 "of its own; leave spacing out"
             )
+        if "scale" in config.parameters:
+            raise InputError(
+                "[scenario] spacing = 'measured' takes the cloth to be as large as size says, so it does not go with "
+                "[parameters.scale]; leave one of them out"
+            )
         first = scenarios[fit_on[0]]
         places = told_places(first.body, first.markers, [recordings[n] for n in fit_on])
         scenarios = {n: replace(s, markers=places) for n, s in scenarios.items()}

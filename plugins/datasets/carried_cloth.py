@@ -87,13 +87,14 @@ def _recording(path: Path, name: str) -> Recording:
         raise InputError(f"{path} has tcp but no tcp_t (K,), the times of its poses [s]; add it, or leave tcp out")
     hand = shaped(data["tcp"], (None, 7), "tcp", path)
     clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand, path)
-    done, early = (camera_lag(stamps[whole], middle, clock, hand[:, :3]) for stamps in (time, begun))
-    if done is None or early is None:
+    done = camera_lag(time[whole], middle, clock, hand[:, :3])
+    if done is None:
         taken = time
         note(f"{name}: the hand rests, so how much the camera lags does not show; it is taken for 0 s")
     else:
-        late = 1 - early.alike < CLEARLY * (1 - done.alike)
-        taken = begun - early.lag if late else time - done.lag
+        early = _lag_or_none(begun[whole], middle, clock, hand[:, :3])
+        late = early is not None and 1 - early.alike < CLEARLY * (1 - done.alike)
+        taken = begun - early.lag if early is not None and late else time - done.lag
         behind = f"{np.median(time - taken):.2f} s{', more after a pause' if late else ''}"
         note(f"{name}: the camera lags the robot by {behind}; points are on the robot's clock")
     turns = multiply(hand[:, [6, 3, 4, 5]], inverse(HOME))
@@ -159,6 +160,14 @@ def camera_lag(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: Floa
     below, at, above = score[best - 1 : best + 2]
     top = 0.5 * (below - above) / min(below - 2 * at + above, -1e-12)
     return Lag(float(LAGS[best] + (LAGS[1] - LAGS[0]) * top), float(at))
+
+
+def _lag_or_none(seen: FloatArray, edge: FloatArray, clock: FloatArray, hand: FloatArray) -> Lag | None:
+    """:func:`camera_lag` of stamps that need not be right."""
+    try:
+        return camera_lag(seen, edge, clock, hand)
+    except InputError:
+        return None
 
 
 def _spread(path: FloatArray) -> float:

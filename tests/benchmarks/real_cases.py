@@ -31,7 +31,7 @@ CABLE_PIECES = {1: 1.25}
 
 #: Takes of the beam, two of each load. One is fitted, the others are held out.
 BEAM_TAKES = ("gravity-b", "gravity-a", "load52-a", "load52-b", "load101-a", "load101-b")
-#: How much lower a hand held the tip in one take than in another before it let go [m].
+#: How far takes of the beam may be off as a whole [m]: the hand that let it go did not hold it equally high in all.
 HELD_LOWER = 0.0015
 
 

@@ -93,13 +93,27 @@ def test_a_grid_that_is_pulled_in_is_placed_by_its_distances(tmp_path: Path) -> 
     assert read_config(tmp_path / "study.toml").scenario.spacing == "measured"
 
 
-@pytest.mark.parametrize("case", ["rows", "size", "told"])
+@pytest.mark.parametrize("case", ["rows", "columns", "turned", "size", "told"])
 def test_what_a_person_says_or_another_order_comes_first(tmp_path: Path, case: str) -> None:
     pytest.importorskip("mujoco")
     points, arguments = sheet(8, 8, 0.3, 0.3), {"size": ("--size", "0.5,0.5"), "told": ("--vertices", "9,9")}
     if case == "rows":  # from the bottom edge
         points = points.reshape(-1, 8, 8, 3)[:, ::-1].reshape(points.shape)
+    if case == "columns":  # one column after the other
+        points = points.reshape(-1, 8, 8, 3).swapaxes(1, 2).reshape(points.shape)
+    if case == "turned":
+        points = points.reshape(-1, 8, 8, 3).swapaxes(1, 2)[:, ::-1].reshape(points.shape)
     said = new(tmp_path, points, *arguments.get(case, ()))
     assert "are a grid of" not in said
     assert ("are a grid over 0.3" in said and "check --size" in said) == (case == "size")
     assert read_config(tmp_path / "study.toml").scenario.vertices != [8, 8]
+
+
+def test_a_first_frame_that_shows_nothing_claims_no_grid(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    points = sheet(8, 8, 0.3, 0.3)
+    points[0] = np.nan
+    save_measurement(Measurement((take(points),)), tmp_path / "m.zarr")
+    given = ["new", str(tmp_path / "s.toml"), "--measurement", str(tmp_path / "m.zarr"), "--scenario", "carry"]
+    done = CliRunner().invoke(app, given)
+    assert "are a grid of" not in done.output and "not seen in the first frame" in " ".join(str(done.exception).split())

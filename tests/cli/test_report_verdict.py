@@ -59,6 +59,7 @@ def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tm
         (0.0519, 0.003, "falls from 52 mm to 3.0 mm"),
         (0.01304, 0.0126, "falls from 13.0 mm to 12.6 mm"),
         (0.013041, 0.013039, "stays at 13.0 mm"),
+        (0.0130, 0.0152, "rises from 13 mm to 15 mm"),
     ],
 )
 def test_an_error_that_falls_by_little_is_told_to_a_tenth(before: float, after: float, said: str) -> None:

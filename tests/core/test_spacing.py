@@ -91,6 +91,15 @@ def test_a_marker_beside_the_sheet_sits_at_its_edge() -> None:
     np.testing.assert_allclose((told @ flat_of(body))[corner], half, atol=1e-9)
 
 
+def test_a_sliver_of_the_mesh_and_a_single_marker_do_no_harm() -> None:
+    body = sheet()
+    with_sliver = Body("cloth", body.vertices, np.concatenate([body.elements, [[0, 1, 2]]]))
+    take = [seen(bent(flat_of(body), 20, 0))]
+    np.testing.assert_allclose(told_places(with_sliver, np.eye(64), take), told_places(body, np.eye(64), take))
+    with pytest.raises(InputError, match="no pair of them is seen"):
+        told_places(body, np.eye(64)[:1], [seen(bent(flat_of(body), 20, 0)[:, :1])])
+
+
 def test_what_tells_nothing_is_refused() -> None:
     body, points = sheet(), bent(flat_of(sheet()), 20, 0)
     eye = np.eye(LINES**2)
@@ -156,3 +165,11 @@ def test_a_study_tells_from_what_is_fitted_alone(tmp_path: Path) -> None:
 def test_a_study_says_what_spacing_goes_with(tmp_path: Path, markers: str) -> None:
     with pytest.raises(InputError, match=f"not markers = '{markers}'; keep one of the two"):
         Study.load(study(tmp_path, f'markers = "{markers}"\nspacing = "measured"'))
+
+
+def test_a_size_is_told_once(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    path = study(tmp_path, 'spacing = "measured"')
+    path.write_text(path.read_text() + "\n[parameters.scale]\nlow = 0.9\nhigh = 1.1\n")
+    with pytest.raises(InputError, match=r"does not go with \[parameters\.scale\]; leave one of them out"):
+        _ = Study.load(path).problem

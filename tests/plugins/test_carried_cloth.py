@@ -28,6 +28,15 @@ def test_the_gripper_of_a_carried_cloth_is_its_top_edge(tmp_path: Path) -> None:
     np.testing.assert_allclose(down, sheet, atol=0.005)  # it hangs where the hand points
 
 
+def test_a_camera_that_hardly_lags_is_read(tmp_path: Path) -> None:
+    """Stamps of the frames before would be too early for any lag that is tried: that is no fault of the recording."""
+    made = carried(-0.55, (0.0, 0.0, 0.0))
+    np.savez(tmp_path / "a.npz", **made)
+    (take,), notes = read("carried-cloth", tmp_path)
+    assert "lags the robot by -0.5" in notes[0] and "pause" not in notes[0]
+    np.testing.assert_allclose(take.series.time, made["t"] + 0.55, atol=0.02)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_frames_that_are_stamped_once_they_are_done_get_their_times_back(tmp_path: Path, seed: int) -> None:
     work = np.random.default_rng(seed).choice([0.06, 0.1, 0.14, 0.3], 36)
