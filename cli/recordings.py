@@ -96,7 +96,7 @@ def import_files(
         list[str] | None,
         typer.Option(
             metavar="NAME",
-            help="With --dataset: a take to read; default all of them. Of a LeRobot data set: an episode, or all.",
+            help="With --dataset: takes to read, as A,B,C or once each; default all. Of LeRobot: an episode, or all.",
         ),
     ] = None,
     fps: Annotated[
@@ -225,12 +225,13 @@ def _of_dataset(
     if len(files) != 1:
         raise InputError(
             f"--dataset reads one file or folder, but {len(files)} are named: {', '.join(map(str, files))}; import "
-            "them one by one, and say --take before each take of one"
+            "them one by one, and write the takes of one as --take A,B,C"
         )
     read: Dataset = REGISTRY.get("dataset", name)
+    wanted = [part.strip() for take in takes for part in take.split(",") if part.strip()]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DatasetNote)
-        recordings = read(files[0], takes)
+        recordings = read(files[0], wanted)
     for warning in caught:
         if issubclass(warning.category, DatasetNote):
             say(str(warning.message))

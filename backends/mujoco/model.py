@@ -55,6 +55,7 @@ class Model:
         commanded: coordinates of the held vertices ``(3 H,)``, then twists of clamped segments, which stay as they are.
         masses: of every vertex ``(V,)`` [kg], loads included.
         soft_bending: what bending MuJoCo does not know, as a matrix ``(V, V)`` [N/m], or ``(0, 0)``.
+        damping_times: of the material of every flex ``(F,)`` [s].
     """
 
     model: "mujoco.MjModel"
@@ -64,6 +65,7 @@ class Model:
     commanded: IntArray
     masses: FloatArray
     soft_bending: FloatArray
+    damping_times: FloatArray
 
 
 def compiled(scene: Scene, time_step: float) -> Model:
@@ -105,7 +107,11 @@ def compiled(scene: Scene, time_step: float) -> Model:
     stretch, cells = _write_material(model, scene, bending)
     turn = frame(body) if quadratic_cells(body) else np.eye(3)
     turned = None if np.array_equal(turn, np.eye(3)) else turn
-    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft)
+    damping_times = np.full(model.nflex, scene.material.damping_time)
+    if isinstance(scene.material, RopeMaterial):
+        second = engine().mj_name2id(model, engine().mjtObj.mjOBJ_FLEX, "second")
+        damping_times[second] = rod.stretch_damping(body, scene.material, masses, scene.held)
+    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft, damping_times)
 
 
 @lru_cache(maxsize=4)

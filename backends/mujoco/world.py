@@ -4,18 +4,18 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.errors import RolloutFailed
+from ...core.material import RopeMaterial
 from ...core.scene import Scene
-from ...core.simulator import State, World, needed_capabilities
+from ...core.simulator import State, World
 from .engine import WARNINGS, engine
+from .gliding import Gliding, Thrown, TwoStep
 from .model import compiled
-from .rod import start_twist
+from .rod import looking_back, start_twist
 from .soft_bending import SoftBending
 
-#: How far beyond MuJoCo's own step, as a part of it, a step goes that touches nothing, by kind: see
-#: :meth:`MujocoWorld._glide`. 1 would not damp at all. MuJoCo leaves terms out of its stiffness that are not positive
-#: definite: straight ropes that resist torsion ten times more than bending start to shake at 0.8, and ropes that
-#: are curved at rest at 0.3; those get none.
-OVERSHOOT = {"cloth": 0.9, "rope": 0.7, "solid": 0.9}
+#: How far beyond MuJoCo's own step, as a part of it, cloth and solids are thrown, see :class:`~.gliding.Thrown`; 1
+#: would not damp at all.
+OVERSHOOT = 0.9
 #: The smallest factor on a stiffness: MuJoCo leaves out a flex of which the first number is zero.
 _SMALLEST_FACTOR = 1e-9
 
@@ -23,8 +23,8 @@ _SMALLEST_FACTOR = 1e-9
 class MujocoWorld(World):
     """Generalised coordinates are vertex displacements from the rest shape, then the twists of a rope's segments.
 
-    A step in which the object touches nothing is made by the theta method, theta = 1 / (1 + overshoot), one in
-    which it does by implicit Euler: what is thrown forward through a contact would come back from it.
+    A step in which the object touches nothing is made by :mod:`.gliding`, one in which it does by implicit Euler: what
+    is thrown forward through a contact would come back from it.
     """
 
     def __init__(self, scene: Scene, time_step: float) -> None:
@@ -67,16 +67,18 @@ class MujocoWorld(World):
         self._state = State(self._positions, self._velocities, self._contact_forces if scene.obstacles else None)
         self._loaded = self._stretched = False
         self._before = np.empty_like(self._qpos), np.empty_like(self._qvel)
-        # of positions and velocities: now, and before the step that is thrown on
-        self._thrown = [(self._qpos[:count], self._before[0][:count]), (self._qvel[:count], self._before[1][:count])]
-        self._damping_time = scene.material.damping_time
+        self._moving = self._qvel[:count]
+        self._driven = np.zeros(len(self._commanded))
+        self._damping_times = made.damping_times
         self._touching = False
         self._elapsed = 0.0  # MuJoCo's own clock runs at the pace of its own steps
-        self._bending = SoftBending(made.soft_bending, self._damping_time) if made.soft_bending.size else None
-        bent = scene.body.kind == "rope" and "curved-rest" in needed_capabilities(scene)
-        self._overshoot = 0.0 if bent else OVERSHOOT[scene.body.kind]
-        self._short = time_step / (1 + self._overshoot)
-        self._pace(self._short)
+        soft = made.soft_bending
+        self._bending = SoftBending(soft, scene.material.damping_time) if soft.size else None
+        self._gliding: Gliding = Thrown(time_step, OVERSHOOT, count)
+        if isinstance(scene.material, RopeMaterial):
+            back = looking_back(scene.body, scene.material, scene.held, time_step)
+            self._gliding = TwoStep(time_step, back, count)
+        self._paced = (0.0, 0.0)
         self._stretch, self._cells = made.stretch, made.cells
         self._plain = np.array(made.stretch)
         self._parts = np.bincount(made.cells, minlength=len(made.stretch))
@@ -113,17 +115,14 @@ class MujocoWorld(World):
             self._target_held[:] = (self._target_held.reshape(-1, 3) @ self._turn).ravel()
         if turns is not None and len(self._start_turns):  # a rope of one segment has no twist
             np.add(self._start_turns, turns, out=self._target_turns)
-        velocity = (self._target - qpos[commanded]) / self.time_step
-        qvel[commanded] = velocity
         if self._touching or not self._glide(forces):
-            self._pace(self.time_step)
+            self._pace(self.time_step, self.time_step)
+            self._drive(self.time_step)
             self._load(forces, 0.0)
             self._step(self._model, self._data)
             self._touching = self._data.ncon > 0
-            if not self._touching:
-                self._pace(self._short)
-        qpos[commanded] = self._target
-        qvel[commanded] = velocity
+            self._gliding.forget()
+        qpos[commanded], qvel[commanded] = self._target, self._driven
         if np.count_nonzero(self._warnings):
             raise RolloutFailed(
                 f"MuJoCo warned {self._elapsed:.3f} s after the start: {' '.join(WARNINGS) or 'no text'}"
@@ -143,39 +142,36 @@ class MujocoWorld(World):
             self._push[:] = 0.0
             self._loaded = False
 
+    def _drive(self, way: float) -> None:
+        """Let what is held move as fast as takes it in the time ``way`` [s] to where it shall be."""
+        np.subtract(self._target, self._qpos[self._commanded], out=self._driven)
+        self._driven /= way
+        self._qvel[self._commanded] = self._driven
+
     def _glide(self, forces: FloatArray | None) -> bool:
         """Make a step if nothing is touched in it; otherwise leave all as it was and say so.
 
-        MuJoCo steps by implicit Euler from (x, v) to (X, V) in the time h theta. What is thrown forward from there,
-        x + (X - x) / theta and the same for v, is where the theta method comes to in the time h. Implicit Euler
-        (theta = 1) damps a mode of angular frequency w at the rate h w^2 / 2, the theta method at (theta - 1/2)
-        h w^2: with theta = 1 / 1.9 that is 19 times less. The twists of a rope, which have next to no inertia, stay
-        where they are in balance.
-
-        References:
-            Hairer and Wanner, *Solving Ordinary Differential Equations II*, 1996, section IV.3.
+        The twists of a rope, which have next to no inertia, stay where MuJoCo finds them in balance.
         """
-        (x, v), (qpos, qvel) = self._before, (self._qpos, self._qvel)
-        x[:], v[:] = qpos, qvel
-        self._load(forces, self.time_step - self._short)
+        gliding = self._gliding
+        self._before[0][:], self._before[1][:] = self._qpos, self._qvel
+        self._pace(gliding.step, gliding.own_damping)
+        gliding.begin(self._moved, self._moving)
+        self._drive(gliding.way)
+        self._load(gliding.forces(forces), self.time_step - gliding.step)
         self._step(self._model, self._data)
         if self._data.ncon:
-            qpos[:], qvel[:] = x, v
+            self._qpos[:], self._qvel[:] = self._before
             return False
-        for now, was in self._thrown:
-            np.subtract(now, was, out=was)
-            was *= self._overshoot
-            now += was
+        gliding.end(self._moved, self._moving)
         return True
 
-    def _pace(self, step: float) -> None:
-        """Let MuJoCo step by ``step`` [s], and take what its integrator damps from the damping of the material.
-
-        The integrator damps like a stiffness-proportional damping of time ``2 (theta - 1/2) h``.
-        """
-        self._model.opt.timestep = step
-        own = 2 * step - self.time_step
-        self._model.flex_damping[:] = max(self._damping_time - own, 0.0)
+    def _pace(self, step: float, own_damping: float) -> None:
+        """Let MuJoCo step by ``step`` [s], and take ``own_damping`` [s] off the damping times of the material."""
+        if (step, own_damping) != self._paced:
+            self._paced = step, own_damping
+            self._model.opt.timestep = step
+            self._model.flex_damping[:] = np.maximum(self._damping_times - own_damping, 0.0)
 
     def _set_stiffness(self, factor: FloatArray | None) -> None:
         """Scale each row of the model's stretch stiffness by the mean of its elements' factors ``(E,)``."""

@@ -17,7 +17,7 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_takes_become_recordings_and_what_was_left_out_is_said(tmp_path: Path) -> None:
-    takes = ["--take", "golf-ball-2", "--take", "tennis-ball-1"]
+    takes = ["--take", "golf-ball-2,tennis-ball-1"]
     done = run(tmp_path, str(DROPS), "--dataset", "balls", *takes, "--stop", "2", "-o", "out.zarr")
     assert done.returncode == 0, done.stderr
     assert "golf-ball-2: left out 1 of 44 frames" in done.stdout and " m (z)" in done.stdout
@@ -27,6 +27,12 @@ def test_takes_become_recordings_and_what_was_left_out_is_said(tmp_path: Path) -
     for recording in made.recordings:
         assert recording.series.time[-1] <= 2.0
         assert np.isfinite(recording.series.points[:, 0, 2]).all()
+
+
+def test_takes_may_be_named_once_each(tmp_path: Path) -> None:
+    takes = ["--take", "golf-ball-2", "--take", "tennis-ball-1"]
+    assert run(tmp_path, str(DROPS), "--dataset", "balls", *takes, "-o", "out.zarr").returncode == 0
+    assert load_measurement(tmp_path / "out.zarr").names == ["golf-ball-2", "tennis-ball-1"]
 
 
 def test_all_takes_come_where_none_is_named(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_a_clamped_rope_sags_as_the_heavy_elastica(rigidity):
 
 @pytest.mark.parametrize("time_step", [0.001, 0.005])
 def test_period_of_a_clamped_rod(time_step):
-    """3.516 / L^2 sqrt(E I / mass per length), to 1.5 %, and it decays at the theta method's (theta - 1/2) h w^2."""
+    """3.516 / L^2 sqrt(E I / mass per length), to 1.5 %; it decays by less than 3 % of implicit Euler's h w^2 / 2."""
     length, rigidity, density = 0.3, 1e-2, 0.05
     body, path = _clamped(length, 12), []
     material = RopeMaterial(density, 1e4, rigidity, rigidity)
@@ -58,7 +58,7 @@ def test_period_of_a_clamped_rod(time_step):
             path.append(world.state().positions[-1, 2])
     frequency, rate = swing(time_step, np.array(path))
     assert frequency == pytest.approx(3.516 / length**2 * np.sqrt(rigidity / density), rel=0.015)
-    assert rate == pytest.approx((1 / 1.7 - 0.5) * time_step * frequency**2, rel=0.15)
+    assert abs(rate) < 0.03 * time_step * frequency**2 / 2
 
 
 def test_a_slack_rope_hangs_as_a_catenary():
@@ -145,6 +145,8 @@ def test_a_straight_rope_started_bent_straightens():
 
 @pytest.mark.parametrize("vertices", [2, 3])
 def test_the_shortest_ropes_fall(vertices):
+    """By g t^2 / 2, and 3/2 of what the first step is off by, which is thrown on from 1 / 1.7 of it."""
     body = rope_line(np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), vertices)
     with opened(scene(body, replace(RopeMaterial(), bending_rigidity=0.0, twist_rigidity=0.0))) as world:
-        np.testing.assert_allclose(run(world, 0.1)[:, 2], -G * 0.05 * (0.1 + 0.005 * (2 / 1.7 - 1)), rtol=1e-8)
+        fallen = 0.1**2 / 2 + 1.5 * (1 / 1.7 - 1 / 2) * 0.005**2
+        np.testing.assert_allclose(run(world, 0.1)[:, 2], -G * fallen, rtol=1e-8)
