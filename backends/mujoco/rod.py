@@ -24,6 +24,8 @@ _STRAIGHT = 1e-6
 _LIMP = 0.2
 #: How far back it is of use to look, and the share of how far back a rope can look without shaking that it does.
 _FURTHEST_BACK, _OF_THE_WAY_BACK = 1.0 / 3.0, 0.7
+#: How stretch is damped that cannot be seen, as a part of what is critical.
+_STRETCH_DAMPING = 0.1
 #: Share of its length that a rope must stretch by under its own weight for the way in which it does so to be seen.
 _SEEN_STRETCH = 0.01
 
@@ -58,9 +60,9 @@ def stretch_damping(body: Body, material: RopeMaterial, masses: FloatArray, held
     """Damping time [s] of the stretch, which is that of the material unless stretch cannot be seen.
 
     A step is linear in where vertices go, so that a segment that turns gets longer by the square of the angle, and the
-    more it is damped the longer it stays so: at 2.5 ms a swung cable of 0.19 s grew by 0.2 %, which moved it by 5 mm.
-    Beyond critical damping, 2 / w with w of the slowest mode, stretch goes no further, but slower. Of a rope that
-    weight stretches by less than 1 % nobody sees the difference.
+    more it is damped the longer it stays so: a swung rope damped for 0.2 s was 40 mm off at 2.5 ms, and is 3.5 mm off with a
+    tenth of what is critical for the slowest mode (``make bench-sim``). How stretch comes to rest nobody sees of a rope that
+    its own weight stretches by less than 1 %.
 
     Args:
         body: the rope.
@@ -74,7 +76,7 @@ def stretch_damping(body: Body, material: RopeMaterial, masses: FloatArray, held
     nodes = place[held] if len(held) else place[[-1]] / 2  # where the slowest mode does not move
     quarter = float(np.abs(place[:, None] - nodes).min(axis=1).max())  # of its wave length
     slowest = np.pi / (2.0 * quarter) * np.sqrt(material.stretch_stiffness * place[-1] / mass) if quarter else np.inf
-    return float(min(material.damping_time, 2.0 / slowest))
+    return float(min(material.damping_time, 2.0 * _STRETCH_DAMPING / slowest))
 
 
 def looking_back(body: Body, material: RopeMaterial, held: IntArray, time_step: float) -> float:

@@ -242,7 +242,9 @@ def time_steps(rows: list[Row]) -> None:
     cases: list[tuple[str, Scenario, Material]] = [
         (name, preset(name).scenario(), MATERIAL) for name in ("fling", "swing")
     ]
-    cases.append(("swing of a rope", rope, preset("swing").default_material("rope")))
+    string = preset("swing").default_material("rope")
+    cases.append(("swing of a rope", rope, string))
+    cases.append(("swing of a rope damped for 0.2 s", rope, replace(string, damping_time=0.2)))
     smallest, *others = STEPS
     for name, scenario, material in cases:
         paths = {
