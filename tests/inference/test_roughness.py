@@ -82,16 +82,22 @@ def test_derivatives_take_short_steps_where_the_model_is_smooth_and_long_ones_wh
 
 
 def test_a_fit_leaves_it_out(study) -> None:  # type: ignore[no-untyped-def]
+    """In the middle of starts beside the truth: each alone may be lucky."""
     problem = study.problem
     unit = np.full(len(problem.space), 0.5)
+    left, known = {"blind": [], "sees": []}, {"blind": [], "sees": []}
     with study.pool() as pool:
         aware_of = roughness(pool, problem.space, unit, ["down"]).discrepancy(problem.recordings, NOISE, Offsets())
         plain = Objective(pool, problem.space, ["down"], NOISE, Offsets())
         aware = Objective(pool, problem.space, ["down"], NOISE, Offsets(), discrepancy=aware_of)
-        blind, sees = polish(plain, unit + 0.003, 1), polish(aware, unit + 0.003, 1)
-    assert blind.rss > 3 * blind.count  # at the truth but for a nudge
-    assert sees.rss < 1.1 * sees.count < blind.count
-    assert np.sqrt(np.diag(sees.covariance)).max() > 10 * np.sqrt(np.diag(blind.covariance)).max()
+        for nudge in (0.002, -0.002, 0.003, -0.003):
+            for name, objective in (("blind", plain), ("sees", aware)):
+                fitted = polish(objective, unit + nudge, 1)
+                left[name].append(fitted.rss / fitted.count)
+                known[name].append(np.sqrt(np.diag(fitted.covariance)).max())
+    assert np.median(left["blind"]) > 3
+    assert np.median(left["sees"]) < 1.1
+    assert np.median(known["sees"]) > 5 * np.median(known["blind"])
 
 
 def test_residuals_are_weighed_by_what_is_known_of_chance() -> None:
