@@ -181,7 +181,8 @@ class _Tournament:
         starts = self.plain.unit[None]
         if not self.effects:
             starts = np.vstack([starts, self.work.starts])
-        return self.moved(candidate, screening_points(candidate.space, base, starts, count, self.rng[candidate.name]))
+        points = screening_points(candidate.space, base, starts, count, self.rng[candidate.name])
+        return self.moved(candidate, points, made_up_for=True)
 
     def from_hints(self, candidate: Candidate, points: FloatArray) -> Candidate:
         """The better of the candidate and of a short approach from the best of ``points (K, D)``."""
@@ -192,13 +193,33 @@ class _Tournament:
         hinted = self.approached(replace(candidate, fit=there, approached=False), FIRST_EVALUATIONS)
         return min(candidate, hinted, key=lambda c: c.rss)
 
-    def moved(self, candidate: Candidate, points: FloatArray) -> Candidate:
+    def moved(self, candidate: Candidate, points: FloatArray, *, made_up_for: bool = False) -> Candidate:
+        """The best of the candidate and of ``points``, and of one of these whose effect the parameters make up for."""
         if not self.work.may_go_on(self.until):
             return candidate
-        best = best_starts(self.work.objective((*self.effects, candidate.name)), points)
+        objective = self.work.objective((*self.effects, candidate.name))
+        best = best_starts(objective, points)
+        if made_up_for and (point := self.made_up(best)) is not None:
+            best = sorted([*best, *best_starts(objective, point[None])], key=lambda row: float(row[1] @ row[1]))
         if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
             return candidate
         return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]), approached=False)
+
+    def made_up(self, rows: list[tuple[FloatArray, FloatArray]]) -> FloatArray | None:
+        """Where a linear model of the parameters alone gets nearest from points of one effect or another ``(D,)``.
+
+        An effect that makes a rope softer shows what it is worth only once the rope is stiffer.
+
+        Args:
+            rows: points and white residuals; of those, the points at the plain fit's parameters count.
+        """
+        base = len(self.plain.unit)
+        at_plain = [(p, w) for p, w in rows if np.allclose(p[:base], self.plain.unit, atol=1e-9)]
+        goals = [(p, *least_square(p[:base], w, self.plain.jacobian)) for p, w in at_plain]
+        if not goals:
+            return None
+        point, parameters, _ = min(goals, key=lambda goal: goal[2])
+        return np.concatenate([parameters, point[base:]])
 
     def approached(self, candidate: Candidate, evaluations: int) -> Candidate:
         """Some way towards the least square; derivatives are those of an earlier approach to the same point."""

@@ -96,6 +96,21 @@ def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_th
     assert found.rss == pytest.approx(reached * COUNT)
 
 
+def test_the_parameters_make_up_for_an_effect_before_it_is_judged() -> None:
+    """The worst point is the best one once a rope that its effect makes softer is made stiffer."""
+    count = int(COUNT)
+    jacobian = 100.0 * np.column_stack([np.ones(count), np.linspace(-1.0, 1.0, count)])
+    tournament = SimpleNamespace(plain=SimpleNamespace(unit=np.array([0.4, 0.5]), jacobian=jacobian))
+    rows = [
+        (np.array([0.4, 0.5, 0.1]), (-1.0) ** np.arange(count)),  # which no parameter makes up for
+        (np.array([0.9, 0.5, 0.3]), np.full(count, 10.0)),  # elsewhere derivatives are others
+        (np.array([0.4, 0.5, 0.6]), np.full(count, -20.0)),
+    ]
+    found = _Tournament.made_up(tournament, rows)  # type: ignore[arg-type]
+    assert found == pytest.approx(np.array([0.6, 0.5, 0.6]), abs=1e-3)
+    assert _Tournament.made_up(tournament, rows[1:2]) is None  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("left", "rest", "cut_short", "said"),
     [
