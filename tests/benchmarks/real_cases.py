@@ -209,7 +209,7 @@ CASES = [
     *CABLES,
     *(given(case, "bent", "rest-curvature") for case in CABLES),
     given(CABLES[0], "bent", "rest-curvature", window=1.25),
-    *(given(CABLES[n], "bent, sliding", "rest-curvature", "rope-hysteresis") for n in (0, 1)),
+    *(given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES),
     *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
     *(CARRIED, on_pybullet(CARRIED), IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
