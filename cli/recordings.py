@@ -229,6 +229,8 @@ def _of_dataset(
         )
     read: Dataset = REGISTRY.get("dataset", name)
     wanted = [part.strip() for take in takes for part in take.split(",") if part.strip()]
+    if takes and not wanted:
+        raise InputError("--take names no take; write --take A,B,C, or leave it out to read all")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", DatasetNote)
         recordings = read(files[0], wanted)

@@ -109,7 +109,7 @@ class TwoStep(Gliding):
         self.forget()
 
     def forget(self) -> None:
-        self._started = False
+        self._started = self._pushed = False
         self.step, self.way, self.own_damping = self._first.step, self._first.way, self._first.own_damping
 
     def begin(self, x: FloatArray, v: FloatArray) -> None:
@@ -124,13 +124,13 @@ class TwoStep(Gliding):
             now += self._change
 
     def forces(self, forces: FloatArray | None) -> FloatArray | None:
+        if forces is None and not self._pushed:
+            return None
         given = self._nothing if forces is None else forces
-        if self._started:
-            np.subtract(given, self._forces, out=self._ahead)
-            self._ahead += given
-        else:
-            self._ahead[:] = given
-        self._forces[:] = given
+        before = (self._forces if self._pushed else self._nothing) if self._started else given
+        np.subtract(given, before, out=self._ahead)
+        self._ahead += given
+        self._forces[:], self._pushed = given, forces is not None
         return self._ahead
 
     def end(self, x: FloatArray, v: FloatArray) -> None:

@@ -22,6 +22,8 @@ _SMALLEST = 1e-12
 _STRAIGHT = 1e-6
 #: How much twist there is to reckon with in limp ropes, as a part of the bending rigidity.
 _LIMP = 0.2
+#: How much the coupling grows by a damping time of one step.
+_BY_DAMPING = 0.3
 #: How far back it is of use to look, and the share of how far back a rope can look without shaking that it does.
 _FURTHEST_BACK, _OF_THE_WAY_BACK = 1.0 / 3.0, 0.7
 #: How stretch is damped that cannot be seen, as a part of what is critical.
@@ -60,8 +62,8 @@ def stretch_damping(body: Body, material: RopeMaterial, masses: FloatArray, held
     """Damping time [s] of the stretch, which is that of the material unless stretch cannot be seen.
 
     A step is linear in where vertices go, so that a segment that turns gets longer by the square of the angle, and the
-    more it is damped the longer it stays so: a swung rope damped for 0.2 s was 40 mm off at 2.5 ms, and is 3.5 mm off
-    with a tenth of what is critical for the slowest mode (``make bench-sim``). How stretch comes to rest nobody sees of
+    more it is damped the longer it stays so: a swung rope damped for 0.2 s is 46 mm off at 2.5 ms, and 3.5 mm with a tenth
+    of what is critical for the slowest mode (``make bench-sim``). How stretch comes to rest nobody sees of
     a rope that its own weight stretches by less than 1 %.
 
     Args:
@@ -85,8 +87,9 @@ def looking_back(body: Body, material: RopeMaterial, held: IntArray, time_step: 
     Bending a bend out of its plane twists a rope. MuJoCo's implicit matrix leaves that coupling out, which makes it too
     soft by a factor of up to :math:`1 + \rho`, and a rope too stiff for the step shakes where that is more than
     1 + 1 / (1 + 2 a). At rest turned by the angle :math:`\Phi` in all, :math:`\rho^2 = c / (1 + c)` with
-    :math:`c = (GJ / EI) (\Phi / \pi)^2`. Damping of the time :math:`\beta` makes more of it: of clamped arcs (0.2 to
-    9 rad, GJ / EI from 0.01 to 100, :math:`\beta` up to 1 s) none shook with c times :math:`1 + 0.3 \beta / h`.
+    :math:`c = (GJ / EI) (\Phi / \pi)^2`. Damping of the time :math:`\beta` makes more of it, limp ropes have more than
+    their GJ says: with :math:`c = (GJ / EI + 0.2) (\Phi / \pi)^2 (1 + 0.3 \beta / h)` and seven tenths of the a that
+    this allows, a rope comes to rest (``test_mujoco_gliding.py``: GJ / EI from 0.01 to 100, up to 9 rad).
     """
     bending = RopeBending(body, held)
     path = np.cumsum(np.concatenate([np.zeros((1, 2)), bending.rest * bending.measures[:, None]]), axis=0)
@@ -94,7 +97,7 @@ def looking_back(body: Body, material: RopeMaterial, held: IntArray, time_step: 
     if turn < _STRAIGHT:
         return _FURTHEST_BACK
     twist = material.twist_rigidity + _LIMP * material.bending_rigidity
-    coupling = twist * (turn / np.pi) ** 2 * (1.0 + 0.3 * material.damping_time / time_step)
+    coupling = twist * (turn / np.pi) ** 2 * (1.0 + _BY_DAMPING * material.damping_time / time_step)
     most = (np.sqrt(1.0 + material.bending_rigidity / max(coupling, _SMALLEST)) - 1.0) / 2.0
     return float(min(_FURTHEST_BACK, _OF_THE_WAY_BACK * most))
 

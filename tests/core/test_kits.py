@@ -116,7 +116,10 @@ FAULTS: dict[str, dict[str, str]] = {
     "free fall": {"gravity": "off a t"},
     "nodal forces accelerate": {"force lost": "off a t"},
     "nodal forces balance gravity": {"half balance": "off a t"},
-    "a force ends with its step": {"force lingers": "after the force has ended"},
+    "a force ends with its step": {
+        "force lingers": "after the force has ended",
+        "force lost": "m/s from acceleration x step",
+    },
     "stretches as its stiffness says": {"stiffness": "times as much"},
     "refines with the time step": {"damping a step": "half of it still"},
     "repeats bit for bit": {"not repeatable": "second rollout differs"},

@@ -45,6 +45,8 @@ def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path) -> None:
         (["--dataset", "bals"], "there is no dataset 'bals'. Did you mean 'balls'?"),
         (["--dataset", "balls", "--take", "golf"], "has no take 'golf'; it has baseball-1"),
         (["--dataset", "balls", "--up", "y"], "--up does not go with --dataset"),
+        (["--dataset", "balls", "--take", "golf-ball-1,golf-ball-1"], "take golf-ball-1 is asked for twice"),
+        (["--dataset", "balls", "--take", ","], "--take names no take"),
         (["--take", "golf-ball-1"], "say which set with --dataset"),
         (
             ["--dataset", "balls", "--take", "golf-ball-1", "golf-ball-2"],

@@ -67,6 +67,16 @@ def test_a_force_that_grows_evenly_acts_as_where_the_step_ends() -> None:
         assert given is not None and given[0] == pytest.approx(k if k == 0 else k + 1)
 
 
+def test_a_force_of_one_step_is_taken_back_in_the_next() -> None:
+    scheme, x, given = TwoStep(0.005, 1 / 3, 1), np.zeros(1), []
+    for force in (None, None, np.ones(1), None, None):
+        scheme.begin(x, x.copy())
+        ahead = scheme.forces(force)
+        given.append(None if ahead is None else float(ahead[0]))
+        scheme.end(x, x.copy())
+    assert given == [None, None, 2.0, -1.0, None]
+
+
 def test_after_a_contact_nothing_is_carried_on() -> None:
     """A scheme that has forgotten goes on as one that begins there."""
     seasoned, fresh = TwoStep(0.005, 1 / 3, 1), TwoStep(0.005, 1 / 3, 1)
@@ -96,21 +106,22 @@ def test_the_more_is_bent_resists_torsion_and_is_damped_the_less_ropes_look_back
     assert back(3.0, 1.0, 0.0) > back(6.0, 1.0, 0.0) > back(6.0, 3.0, 0.0) > back(6.0, 3.0, 0.1) > 0.0
 
 
-@pytest.mark.parametrize(
-    ("turn", "ratio", "damping_time"),
-    [(6.28, 0.3, 0.01), (6.28, 3.0, 0.5), (3.0, 1.0, 0.2), (2.0, 10.0, 0.05), (1.0, 100.0, 0.0), (9.0, 0.01, 0.2)],
-)
-def test_a_stiff_bent_rope_comes_to_rest(turn: float, ratio: float, damping_time: float) -> None:
-    """It does not shake: in 0.1 s that begin 2 s after the start the steps of no vertex turn to and fro by 5 um."""
-    body = arc(turn)
-    material = RopeMaterial(0.002, 1e4, 1e-2, 1e-2 * ratio, damping_time=damping_time)
+@pytest.mark.parametrize("seed", range(24))
+def test_a_stiff_bent_rope_comes_to_rest(seed: int) -> None:
+    """It may still swing, but does not shake: 2 s after the start the third differences of its steps are below 5 um.
+
+    Arcs of up to 9 rad, GJ / EI from 0.01 to 100, damped for up to 0.5 s.
+    """
+    rng = np.random.default_rng(seed)
+    body, damping_time = arc(rng.uniform(0.2, 9.0)), float(rng.choice([0.01, 0.05, 0.2, 0.5]))
+    material = RopeMaterial(0.002, 1e4, 1e-2, 1e-2 * 10 ** rng.uniform(-2, 2), damping_time=damping_time)
     path = []
     with opened(scene(body, material, held=HELD, gravity=DOWN), time_step=0.005) as world:
         for k in range(420):
             world.step(body.vertices[:2], None)
             if k >= 400:
                 path.append(world.state().positions.copy())
-    assert np.abs(np.diff(path, 2, axis=0)).max() < 5e-6
+    assert np.abs(np.diff(path, 3, axis=0)).max() < 5e-6
 
 
 @pytest.mark.parametrize("damping_time", [0.0, 0.01, 0.2])
