@@ -198,12 +198,13 @@ class _Tournament:
         if not self.work.may_go_on(self.until):
             return candidate
         objective = self.work.objective((*self.effects, candidate.name))
-        best = best_starts(objective, points)
-        if made_up_for and (point := self.made_up(best)) is not None:
-            best = sorted([*best, *best_starts(objective, point[None])], key=lambda row: float(row[1] @ row[1]))
-        if not best or float(best[0][1] @ best[0][1]) >= candidate.rss:
+        rows = best_starts(objective, points)
+        if made_up_for and (point := self.made_up(rows)) is not None:
+            rows += best_starts(objective, point[None])
+        best, white = min(rows, key=lambda row: float(row[1] @ row[1]), default=(None, None))
+        if best is None or white is None or float(white @ white) >= candidate.rss:
             return candidate
-        return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, *best[0]), approached=False)
+        return replace(candidate, fit=self.looks[candidate.name].as_fit(self.plain, best, white), approached=False)
 
     def made_up(self, rows: list[tuple[FloatArray, FloatArray]]) -> FloatArray | None:
         """Where a linear model of the parameters alone gets nearest from points of one effect or another ``(D,)``.

@@ -111,6 +111,22 @@ def test_the_parameters_make_up_for_an_effect_before_it_is_judged() -> None:
     assert _Tournament.made_up(tournament, rows[1:2]) is None  # type: ignore[arg-type]
 
 
+def test_a_search_goes_on_from_where_the_parameters_make_up_for_an_effect() -> None:
+    starts: list[FloatArray] = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
+        starts.append(unit)
+        return candidate("drag", COUNT).fit
+
+    work, tournament = bench(polished)
+    # the effect does harm, which a parameter far below all that is screened makes up for
+    work.objective = lambda effects: SimpleNamespace(
+        many=lambda points: [np.full(int(COUNT), 0.5 if p[0] < 0.01 < p[1] else 3.0) for p in points]
+    )
+    tournament.run()
+    assert starts[0][0] < 0.01 < starts[0][1]
+
+
 @pytest.mark.parametrize(
     ("left", "rest", "cut_short", "said"),
     [
