@@ -84,6 +84,12 @@ def test_no_effect_from_outside_is_a_candidate() -> None:
     assert all(set(accepted) <= known for _, accepted in LAWS.values())
 
 
+def test_two_at_once_do_not_hang_on_one_that_cannot_show() -> None:
+    for case in (c for c in first("development", 200) if c.kind == "two"):
+        assert not set.intersection(*map(set, case.offers))
+        assert all(a != b for a, b in case.offers)
+
+
 @pytest.mark.parametrize("name", SETTINGS)
 def test_a_finer_mesh_is_seen_and_held_at_the_same_places(name: str) -> None:
     setting = SETTINGS[name]

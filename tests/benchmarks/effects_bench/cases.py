@@ -144,8 +144,8 @@ class _Dealer:
             return ((first_other,), *((o,) for o in self._shuffled(pool) if o != first_other))
         first_effect = self._effects[setting].deal()
         rest = [e for e in self._shuffled(SETTINGS[setting].effects) if e != first_effect]
-        if self.kind == "two":
-            return tuple((first_effect, other) for other in rest)
+        if self.kind == "two":  # where the first one cannot show, others must be able to
+            return tuple(itertools.combinations((first_effect, *rest), 2))
         return ((first_effect,), *((e,) for e in rest))
 
     def _shuffled(self, names: Sequence[str]) -> list[str]:

@@ -1,7 +1,7 @@
 """From a case to what was measured and what it hides."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -138,11 +138,11 @@ def _hide(
         recordings = {r.name: replace(r, series=s) for r, s in zip(fitted, other, strict=True)}
         gap = Calibrator(problem, values, case.noise).fit_to({**problem.recordings, **recordings}).misfit
         left = case.noise * float(np.hypot(1.0, gap))
-    calibrator = Calibrator(problem, values, left)
+    strengths = _Strengths(Calibrator(problem, values, left), case.strength, rng)
     for offer in case.offers:
         if any(_powerless(name, case, problem) for name in offer):
             continue
-        found = _try(case, offer, calibrator, rng)
+        found = _try(case, offer, strengths)
         if found is not None:
             hidden, rivals = found
             accepted = () if case.kind == "unknown" else tuple(hidden)
@@ -168,17 +168,30 @@ def _powerless(name: str, case: Case, problem: Problem) -> bool:
     )
 
 
-def _try(
-    case: Case, offer: tuple[str, ...], calibrator: Calibrator, rng: np.random.Generator
-) -> tuple[dict[str, Scaled], tuple[str, ...]] | None:
+@dataclass(eq=False)
+class _Strengths:
+    """Effects at the strength of a case, each tried once however many offers it is part of."""
+
+    calibrator: Calibrator
+    strength: str
+    rng: np.random.Generator
+    tried: dict[str, Scaled | None] = field(default_factory=dict)
+
+    def of(self, name: str) -> Scaled | None:
+        if name not in self.tried:
+            effect = effect_class(name)
+            self.tried[name] = scaled(self.calibrator, effect, direction(effect, self.rng), self.strength)
+        return self.tried[name]
+
+
+def _try(case: Case, offer: tuple[str, ...], strengths: _Strengths) -> tuple[dict[str, Scaled], tuple[str, ...]] | None:
     if case.kind == "tied":
-        return _look_alike(offer[0], offer[1], calibrator, rng)
+        return _look_alike(offer[0], offer[1], strengths.calibrator, strengths.rng)
     if case.kind == "poor":
-        return _unseen(offer[0], calibrator, rng)
+        return _unseen(offer[0], strengths.calibrator, strengths.rng)
     hidden = {}
     for name in offer:
-        effect = effect_class(name)
-        found = scaled(calibrator, effect, direction(effect, rng), case.strength)
+        found = strengths.of(name)
         if found is None:
             return None
         hidden[name] = found
