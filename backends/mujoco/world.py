@@ -9,6 +9,7 @@ from ...core.scene import Scene
 from ...core.simulator import State, World
 from .engine import WARNINGS, engine
 from .gliding import Gliding, Thrown, TwoStep
+from .lengthening import Lengthening
 from .model import compiled
 from .rod import looking_back, start_twist
 from .soft_bending import SoftBending
@@ -80,6 +81,9 @@ class MujocoWorld(World):
             self._gliding = TwoStep(time_step, back, count)
         self._paced = (0.0, 0.0)
         self._stretch, self._cells = made.stretch, made.cells
+        self._lengthening: Lengthening | None = None
+        if scene.body.kind == "cloth" and scene.material.damping_time > time_step:
+            self._lengthening = Lengthening(scene.body.elements, scene.body.vertices, made.stretch)
         self._plain = np.array(made.stretch)
         self._parts = np.bincount(made.cells, minlength=len(made.stretch))
 
@@ -109,6 +113,9 @@ class MujocoWorld(World):
             forces = self._inward(forces).ravel()
         if stiffness is not None or self._stretched:
             self._set_stiffness(stiffness)
+        if self._lengthening is not None:
+            free = self._lengthening.force(self._moved.reshape(-1, 3), self._damping_times[0] / self.time_step - 1.0)
+            forces = free if forces is None else forces + free
         qpos, qvel, commanded = self._qpos, self._qvel, self._commanded
         np.subtract(held.ravel(), self._rest_held, out=self._target_held)
         if self._turn is not None:

@@ -246,13 +246,17 @@ def time_steps(rows: list[Row]) -> None:
     cases.append(("swing of a rope", rope, string))
     damped = replace(string, damping_time=0.2)
     cases.append(("swing of a rope damped for 0.2 s", rope, damped))
+    sheet, felt = preset("swing").scenario(), replace(MATERIAL, damping_time=0.05)
+    cases.append(("swing of a cloth damped for 0.05 s", sheet, felt))
     for name, scenario, material in cases:
         paths = from_the_smallest(rows, name, scenario, material)
         other = rollout(REGISTRY.get("simulator", "pybullet")(), scenario, material).vertices
         for step, path in paths.items():
             rows.append(Row(f"(f) {name}, PyBullet from MuJoCo at {1e3 * step:g} ms", apart(other, path), "mm RMS"))
     with patch("muslin.backends.mujoco.rod.stretch_damping", lambda body, material, *_: material.damping_time):
-        from_the_smallest(rows, "the same with its stretch damped as long", rope, damped)
+        from_the_smallest(rows, "that rope with its stretch damped as long", rope, damped)
+    with patch("muslin.backends.mujoco.lengthening.Lengthening.force", lambda _, moved, steps: np.zeros(moved.size)):
+        from_the_smallest(rows, "that cloth held by its damping where its edges get longer", sheet, felt)
 
 
 def from_the_smallest(rows: list[Row], name: str, scenario: Scenario, material: Material) -> dict[float, FloatArray]:
