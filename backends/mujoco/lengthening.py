@@ -19,8 +19,8 @@ class Lengthening:
     the terms of the energy e.M.e / 4 of a triangle (see :mod:`.shell`). What goes to and fro from step to step does not
     count: :math:`\delta` is the mean of the last two.
 
-    To take off all of it, and what the elasticity has to take back as well, comes twice as near to the limit of small
-    steps, and near that limit a sheet in motion is left to chance: what a fit seeks is then in one of many valleys.
+    No more than that: a sheet that is hardly damped is nearer to chance the nearer it is to the limit of small steps,
+    and what a fit seeks is then in one of many valleys.
 
     Args:
         triangles: of the sheet ``(E, 3)``.
