@@ -12,7 +12,7 @@ from ..core.material import UNITS
 from ..core.obstacles import Obstacle
 from ..core.registry import REGISTRY
 from ..core.scenarios import SIZES, preset
-from ..core.scenarios.measured import MEASURED_STEP
+from ..core.scenarios.measured import MEASURED_STEP, MEASURED_TAILS
 from ..core.study.config import DiagnoseTable, EstimatorTable
 from .study_plan import Plan
 
@@ -270,11 +270,14 @@ def _noise(plan: Plan) -> str:
     if plan.near is None:
         return (
             "# sd = 0.003  # of a coordinate [m]; left out, it is estimated; larger, it is how near the model is meant "
-            "to come"
+            "to come\n"
+            "# tails = 3.0  # where parts of a motion are left to chance: frames that are off by more than so many sd "
+            "count by a logarithm only"
         )
     return f"""# The measurement is far better than any model of a rope in motion. So this is not its noise (which is
 # estimated where it is left out), but how near the model is meant to come; what is beyond counts as a misfit.
-sd = {_value(plan.near)}  # of a coordinate [m]"""
+sd = {_value(plan.near)}  # of a coordinate [m]
+tails = {_value(MEASURED_TAILS)}  # what whips is left to chance: frames off by more sd count by a logarithm"""
 
 
 def _value(value: Any) -> str:

@@ -1,6 +1,6 @@
 """How noisy the measurement is: told, from repeats, or from its roughness in time."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ class Noise:
         source: how it was found.
         unit: "m" or "px".
         relative_error: of ``sd``, one standard deviation.
+        tails: a fit counts frames that are off by much more than so many ``sd`` by a logarithm only; None: by squares.
     """
 
     sd: float
@@ -43,18 +44,24 @@ class Noise:
     source: str
     unit: str
     relative_error: float
+    tails: float | None = None
 
     @property
     def information(self) -> float:
         """How many independent numbers one number of an AR(1) sequence is worth, for its mean."""
         return (1 - self.ar1) / (1 + self.ar1)
 
+    @property
+    def normal(self) -> "Noise":
+        """The same without tails: what is drawn as noise, and what a misfit is held against."""
+        return replace(self, tails=None)
+
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
-def estimate_noise(problem: Problem, told: float | None) -> Noise:
-    """The noise of a study's recordings.
+def estimate_noise(problem: Problem, told: float | None, tails: float | None = None) -> Noise:
+    """The noise of a study's recordings, with ``tails`` as the study says.
 
     Told by the study, else from repeats of the same motion, held-out takes among them (their difference
     is pure noise, take to take variation of the object included), else from the fourth difference in
@@ -66,7 +73,7 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
     recordings = list(problem.recordings.values())
     unit = recordings[0].series.unit
     if told is not None:
-        return Noise(told, 0.0, "given in the study", unit, 0.02)
+        return Noise(told, 0.0, "given in the study", unit, 0.02, tails)
     pairs = repeats(recordings)
     estimates = [e for e in (_from_repeats(a, b) for a, b in pairs) if e is not None]
     if estimates:
@@ -88,7 +95,7 @@ def estimate_noise(problem: Problem, told: float | None) -> Noise:
         error = float(1.2 / np.sqrt(len(rough) / 2))
     if sd <= 0:
         raise InputError("the measurement has no noise at all; give a standard deviation: [noise] sd = 0.001")
-    return Noise(sd, correlation, source, unit, error)
+    return Noise(sd, correlation, source, unit, error, tails)
 
 
 def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None:

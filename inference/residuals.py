@@ -14,6 +14,8 @@ from .noise import Noise
 
 #: Gauss-Newton steps that find the offsets: where points correspond, and at most where each looks for its nearest.
 _STEPS, _CLOSEST_STEPS = 4, 12
+#: Keeps a frame without any error from dividing by it.
+_TINY = 1e-24
 #: What a failed rollout counts as, in every residual [noise standard deviations].
 FAILED = 100.0
 
@@ -179,6 +181,16 @@ def _weighted(difference: FloatArray, noise: Noise) -> FloatArray:
 
     Filtering them to innovations instead would weigh fast errors above slow ones, and a stiff model
     that hardly moves would beat the right one that swings slightly out of phase.
+
+    With tails c, a frame whose n differences have the mean square q [noise variances] adds up to
+    n log(1 + q / c^2) / log(1 + 1 / c^2): a Student t of all that a frame shows (Lange, Little and Taylor, *Robust
+    statistical modeling using the t distribution*, 1989), scaled so that what is off as noise is counts as noise does.
+    Small errors grow in what moves fast, until a whip or a twirl goes one way or the other, whatever the parameters;
+    by squares one such take outweighs all that a model can follow.
     """
+    if noise.tails is not None:
+        q = np.nan_to_num(_rms(difference, (1, 2))) ** 2 / noise.sd**2
+        counted = np.log1p(q / noise.tails**2) / np.log1p(1.0 / noise.tails**2)
+        difference = difference * np.sqrt(counted / np.maximum(q, _TINY))[:, None, None]
     seen = difference[np.isfinite(difference)]
     return np.asarray(seen * (np.sqrt(noise.information) / noise.sd))

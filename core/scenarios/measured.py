@@ -30,6 +30,8 @@ MEASURED_STEP = 0.0025
 #: How near the model of a rope in motion is meant to come [m], where it is seen far better. Held against the noise of
 #: motion capture alone, every draw is as wrong as every other, and frames count as left to chance.
 MEASURED_NEAR = 0.005
+#: Frames that are further off than so many times that count by a logarithm only: what whips is left to chance.
+MEASURED_TAILS = 3.0
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200

@@ -68,9 +68,14 @@ class ParameterTable(StrictTable):
 
 
 class NoiseTable(StrictTable):
-    """``[noise]``: standard deviation of the measurement, if it is known."""
+    """``[noise]``: standard deviation of the measurement, if it is known.
+
+    With ``tails``, a fit and a diagnosis count frames that are further off than so many of it by a logarithm only, for
+    motions of which parts are left to chance.
+    """
 
     sd: float | None = Field(default=None, gt=0)
+    tails: float | None = Field(default=None, ge=1)
 
 
 class NuisanceTable(StrictTable):

@@ -42,7 +42,7 @@ def offsets_of(study: Study) -> Offsets:
 def fit(study: Study) -> FitResult:
     """Fit a study: continue from the draws that its store has, or return the finished result."""
     problem, config = study.problem, study.config
-    noise = estimate_noise(problem, config.noise.sd)
+    noise = estimate_noise(problem, config.noise.sd, config.noise.tails)
     takes = _takes(study, noise)
     make_estimator(study, takes.correspondence)  # a wrong name or option is said now
     with only_one(study.results_path):

@@ -26,8 +26,6 @@ EXAMPLES = ROOT / "examples"
 #: Takes of a cable, fitted on and held out, all of their 5 s: spread evenly from that which starts slowest to that
 #: which starts fastest, alternately. The others are never used, and the error on them is told, too.
 CABLE_TAKES = (5, 4)
-#: Pieces that takes are fitted in [s], of cables whose whole takes are left to chance, as a fit to these says.
-CABLE_PIECES = {1: 1.25}
 
 #: Takes of the beam, two of each load. One is fitted, the others are held out.
 BEAM_TAKES = ("gravity-b", "gravity-a", "load52-a", "load52-b", "load101-a", "load101-b")
@@ -137,7 +135,6 @@ def cable(number: int) -> Case:
         config = read_config(EXAMPLES / "cable/study.toml")
         config.study.hold_out = [r.name for r in used[1::2]]
         config.study.fit_on = [r.name for r in used[0::2]]
-        config.study.window = CABLE_PIECES.get(number)
         write_config(config, folder / "study.toml")
         save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
         return Study.load(folder / "study.toml", workers=workers)
@@ -145,20 +142,19 @@ def cable(number: int) -> Case:
     return Case(f"cable {number}", path, make, open_loop=True, picture=True)
 
 
-def given(case: Case, told: str, *effects: str, window: float | None = None) -> Case:
-    """The same with ``effects``, whatever a diagnosis says, fitted in pieces of ``window`` [s] if that is given."""
+def given(case: Case, told: str, *effects: str) -> Case:
+    """The same with ``effects``, whatever a diagnosis says."""
 
     def make(folder: Path, workers: int | None) -> Study:
         study = case.make(folder, workers)
         for effect in effects:
             study = study.add(effect)
         config = study.config.model_copy(deep=True)
-        config.study.window = window
         config.diagnose.simulations = 300
         write_config(config, study.path)
         return Study.load(study.path, workers=workers)
 
-    return replace(case, name=f"{case.name}, {told}" + (", in pieces" if window else ""), make=make)
+    return replace(case, name=f"{case.name}, {told}", make=make)
 
 
 def carried_cloth(folder: Path, workers: int | None) -> Study:
@@ -207,8 +203,6 @@ CASES = [
     *BEAMS,
     *(replace(on_pybullet(case), picture=case is BEAMS[1]) for case in BEAMS),
     *CABLES,
-    *(given(case, "bent", "rest-curvature") for case in CABLES),
-    given(CABLES[0], "bent", "rest-curvature", window=1.25),
     *(given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES),
     *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
     *(CARRIED, on_pybullet(CARRIED), IN_AIR),

@@ -12,7 +12,7 @@ from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP
+from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP, MEASURED_TAILS
 from muslin.core.series import PointSeries
 from muslin.core.study import build_problem, read_config
 
@@ -108,7 +108,8 @@ def test_a_rope_that_is_seen_far_better_than_it_is_modelled_is_held_to_less(
     save_measurement(Measurement((take, replace(take, name="two"))), tmp_path / "m.zarr")
     path = tmp_path / "s.toml"
     assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
-    assert read_config(path).noise.sd == near
+    told = read_config(path).noise
+    assert (told.sd, told.tails) == ((near, MEASURED_TAILS) if near else (None, None))
     assert ("come within 5 mm ([noise] sd)" in capsys.readouterr().out) == (near is not None)
 
 

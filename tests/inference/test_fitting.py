@@ -15,9 +15,10 @@ import zarr
 from small import TRUTH, small_measurement, write_study
 
 from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreError
+from muslin.core.measurement import Measurement
 from muslin.core.measurement_store import save_measurement
 from muslin.core.store import read
-from muslin.core.study import Study
+from muslin.core.study import Study, read_config, write_config
 from muslin.inference.polish import Objective, Polished
 from muslin.inference.sequential import fitting
 from muslin.inference.sequential.only_one import only_one
@@ -35,6 +36,24 @@ def test_a_right_model_is_fitted_within_its_uncertainty(small_study: Study) -> N
     comparison = small_study.compare()
     assert comparison.adequate, comparison.text()
     assert all(row.rmse < row.baseline for row in comparison.rows)
+
+
+def test_with_tails_what_goes_another_way_does_not_lead_the_fit(tmp_path: Path) -> None:
+    near, far, other = small_measurement().recordings
+    points = far.series.points.copy()
+    points[-8:, 5:] += 0.08 * np.sin(np.arange(11.0))[:, None]  # from then on it is off, each point its own way
+    measurement = Measurement((near, replace(far, series=replace(far.series, points=points)), other))
+    truth = np.array([TRUTH.stretch_stiffness, TRUTH.bending_rigidity])
+    off = {}
+    for tails in (None, 3.0):
+        path = write_study(tmp_path / str(tails), measurement)
+        config = read_config(path)
+        config.noise.sd, config.noise.tails = 0.001, tails
+        write_config(config, path)
+        study = Study.load(path, workers=1)
+        off[tails] = np.abs(np.log(study.fit().estimate / truth))
+        assert not study.compare().adequate  # by squares, whatever the fit goes by
+    assert np.all(off[3.0] < 0.1) and np.all(off[3.0] < off[None] / 3), off
 
 
 def test_a_fit_tells_what_is_known_past_chance(small_study: Study, monkeypatch: pytest.MonkeyPatch) -> None:

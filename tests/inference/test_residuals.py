@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from muslin.core.differences import fourth_differences
 from muslin.core.measurement import Recording
@@ -50,6 +51,40 @@ def test_points_not_seen_do_not_count() -> None:
     r = residual(recording, PointSeries(TIME, wave()), NOISE, Offsets())
     assert len(r.white) == points.size - 30
     assert len(failed(recording, Offsets(0.01, 0.01))) == len(r.white) + 4
+
+
+def test_a_frame_that_is_far_off_counts_by_a_logarithm() -> None:
+    heavy = replace(NOISE, tails=3.0)
+
+    def counted(away: float, noise: Noise = heavy) -> float:
+        points = wave()
+        points[50] += away * NOISE.sd
+        white = residual(Recording("a", PointSeries(TIME, points)), PointSeries(TIME, wave()), noise, Offsets()).white
+        return float(white @ white) / points[50].size
+
+    assert counted(0.0) == 0.0
+    assert counted(1.0) == pytest.approx(1.0)  # what is off as noise is counts as noise does
+    assert counted(0.01) == pytest.approx(0.01**2 / (9 * np.log1p(1 / 9)), rel=1e-4)
+    assert counted(300.0) == pytest.approx(np.log1p(1e4) / np.log1p(1 / 9))
+    assert np.all(np.diff([counted(away) for away in np.geomspace(0.1, 1000, 40)]) > 0)
+    assert counted(300.0, heavy.normal) == pytest.approx(300.0**2)
+
+
+def test_with_tails_one_take_that_goes_another_way_does_not_lead() -> None:
+    rng = np.random.default_rng(3)
+    takes = [Recording(str(k), PointSeries(TIME, wave() + NOISE.sd * rng.normal(size=wave().shape))) for k in range(5)]
+    odd = replace(takes[0], series=replace(takes[0].series, points=takes[0].series.points + 50 * NOISE.sd))
+
+    def best(noise: Noise) -> float:
+        def cost(shift: float) -> float:
+            moved = PointSeries(TIME, wave() + shift * NOISE.sd)
+            whites = [residual(r, moved, noise, Offsets()).white for r in (odd, *takes[1:])]
+            return sum(float(w @ w) for w in whites)
+
+        return float(optimize.minimize_scalar(cost, bounds=(-5.0, 50.0), method="bounded").x)
+
+    assert best(NOISE) == pytest.approx(10.0, abs=0.1)
+    assert best(replace(NOISE, tails=3.0)) == pytest.approx(0.0, abs=0.3)
 
 
 def test_without_correspondence_order_does_not_matter() -> None:
