@@ -57,11 +57,8 @@ class Case:
         return "-".join(re.findall(r"[a-z0-9]+", self.name.lower()))
 
 
-def on_pybullet(case: Case, *left_out: str, draws: int | None = None, simulations: int | None = None) -> Case:
-    """The same on the other engine, without the parameters ``left_out`` that it does not have.
-
-    Where its rollouts take long, fewer ``draws`` are fitted and fewer ``simulations`` diagnosed with.
-    """
+def on_pybullet(case: Case, *left_out: str) -> Case:
+    """The same on the other engine, without the parameters ``left_out`` that it does not have."""
 
     def make(folder: Path, workers: int | None) -> Study:
         study = case.make(folder, workers)
@@ -69,8 +66,6 @@ def on_pybullet(case: Case, *left_out: str, draws: int | None = None, simulation
         config.simulator.name = "pybullet"
         for name in left_out:
             del config.parameters[name]
-        config.estimator.draws = draws or config.estimator.draws
-        config.diagnose.simulations = simulations or config.diagnose.simulations
         write_config(config, study.path)
         return Study.load(study.path, workers=workers)
 
@@ -196,6 +191,7 @@ def cloud(motion: str, sheet: str) -> Case:
 
 BEAMS = [beam("gravity-b"), beam("load52-a", ", from 52 g", HELD_LOWER)]
 CABLES = [cable(number) for number in (1, 2, 3)]
+SLIDING = [given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES]
 CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth, picture=True)
 IN_AIR = Case("carried cloth, air", DATA / "cloth_carried", carried_in_air)
 CASES = [
@@ -203,8 +199,8 @@ CASES = [
     *BEAMS,
     *(replace(on_pybullet(case), picture=case is BEAMS[1]) for case in BEAMS),
     *CABLES,
-    *(given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES),
-    *(on_pybullet(case, "twist_rigidity", draws=40, simulations=300) for case in CABLES),
+    *SLIDING,
+    *(on_pybullet(case, "twist_rigidity") for case in SLIDING),
     *(CARRIED, on_pybullet(CARRIED), IN_AIR),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]
