@@ -20,9 +20,8 @@ from .secants import CHANCE, LARGEST, Found, search
 MISFIT, STARTS, APART = 1.5, 4, 0.1
 #: Evaluations of a search, and from each of these before they are given up.
 EVALUATIONS, FEW_EVALUATIONS = 40, 10
-#: A search ends where it promises less in -2 log likelihood. From a kink where it leaves this times what noise leaves
-#: it looks around once more.
-TOLD_APART, KINKED = 0.3, 1.05
+#: A search ends where it promises less in -2 log likelihood.
+TOLD_APART = 0.3
 #: How far derivatives are trusted at first, and the smallest steps before they are taken.
 NEARBY, COARSE = 0.02, 0.002
 
@@ -141,8 +140,9 @@ def polish(
 ) -> Polished:
     """Bounded least squares from ``start`` in the unit cube; see :mod:`.secants`.
 
-    Where it comes to rest on a kink, with a misfit left, it looks around farther off; then it goes on by derivatives,
-    which see a way down a narrow valley that wide differences do not; and so on, until that gains next to nothing.
+    Where it comes to rest on a kink it looks around farther off, be there a misfit or not: what is left may be no more
+    than noise and the parameters wrong. Then it goes on by derivatives, which see a way down a narrow valley that wide
+    differences do not; and so on, until that gains next to nothing.
 
     Args:
         objective: to make least.
@@ -159,7 +159,7 @@ def polish(
     best, used, smooth = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
     while True:
         before = best.rss
-        if used < evaluations and not (roughly or smooth) and best.rss > KINKED * count:
+        if used < evaluations and not (roughly or smooth):
             best, more, _ = search(
                 objective.many, best, evaluations - used, enough=enough, least=coarse, radius=LARGEST
             )

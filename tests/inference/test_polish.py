@@ -88,6 +88,27 @@ def test_a_misfit_that_no_parameter_reaches_costs_no_long_search(start: tuple[fl
     assert (np.abs(best.unit - exact) < 0.3 * sd).all()
 
 
+class Kink(Linear):
+    """What a parameter does has a kink above its minimum, and noise that is many times as much."""
+
+    def __init__(self) -> None:
+        super().__init__(2.0)
+        self.drawn = np.random.default_rng(1).normal(size=4000)
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return [np.append(self.drawn, [self.signal(u[0]), 30.0 * (u[1] - 0.7)]) for u in units]
+
+    def signal(self, a: float) -> float:
+        return 8.0 + 80.0 * abs(a - 0.6) if a > 0.52 else 40.0 * abs(a - 0.4)
+
+
+def test_it_looks_around_from_a_kink_where_no_more_than_noise_is_left() -> None:
+    kink = Kink()
+    on_it = np.array([0.6, 0.7])
+    assert float(kink.one(on_it) @ kink.one(on_it)) < 1.05 * kink.count(kink.one(on_it))
+    assert polish(kink, np.array([0.65, 0.6])).unit[0] == pytest.approx(0.4, abs=0.02)
+
+
 def test_derivatives_are_taken_at_the_step_that_is_told() -> None:
     class Noted(Linear):
         asked: FloatArray
