@@ -97,15 +97,18 @@ def joined(
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Rows and skipped sets of this run beside those of ``old``, the content of an earlier ``real.json``.
 
-    Every row keeps the machine and the versions that it was made with. A set that was skipped now keeps its row.
+    Every row keeps the machine and the versions that it was made with. A set that was skipped now keeps its row; what
+    is no set any more loses it.
     """
+    place = {c.name: k for k, c in enumerate(CASES)}
     made = {r["set"]: r for r in rows}
     for row in old.get("rows", []):
         labels = {key: row.get(key, old.get(key)) for key in ("machine", "versions")}
-        made.setdefault(row["set"], row | labels)
-    left = {name: why for name, why in {**old.get("skipped", {}), **skipped}.items() if name not in made}
-    place = {c.name: k for k, c in enumerate(CASES)}
-    return sorted(made.values(), key=lambda r: place.get(r["set"], len(place))), left
+        if row["set"] in place:
+            made.setdefault(row["set"], row | labels)
+    without = place.keys() - made.keys()
+    left = {name: why for name, why in {**old.get("skipped", {}), **skipped}.items() if name in without}
+    return sorted(made.values(), key=lambda r: place[r["set"]]), left
 
 
 def markdown(rows: list[dict[str, Any]], skipped: Mapping[str, str]) -> str:
@@ -164,34 +167,36 @@ def _told(e: Mapping[str, Any]) -> str:
     return f"{text} ({1e3 * e['median_take']:.1f} mm in the median over {e['takes']} takes{failed})"
 
 
+def written(path: Path, rows: list[dict[str, Any]], skipped: Mapping[str, str]) -> str:
+    """Put rows into the results at ``path``, beside those that it has, and return them all as markdown."""
+    old = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    rows, skipped = joined(old, rows, skipped)
+    text = markdown(rows, skipped)
+    content = json.dumps({"rows": rows, "skipped": skipped}, indent=1, ensure_ascii=False)
+    path.write_text(content + "\n", encoding="utf-8")
+    path.with_suffix(".md").write_text(text, encoding="utf-8")
+    return text
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--workers", type=int, default=None)
     parser.add_argument("--only", nargs="*", help=f"of {', '.join(c.name for c in CASES)}; the others keep their rows")
     told = parser.parse_args()
-    rows: list[dict[str, Any]] = []
-    skipped: dict[str, str] = {}
+    path, text = RESULTS / "real.json", ""
     for case in CASES:
         if told.only is not None and case.name not in told.only:
             continue
         if not case.needs.exists():
-            skipped[case.name] = f"there is no {case.needs.name} where MUSLIN_DATA points"
-            print(f"skipped {case.name}: {skipped[case.name]}", flush=True)
+            why = f"there is no {case.needs.name} where MUSLIN_DATA points"
+            text = written(path, [], {case.name: why})
+            print(f"skipped {case.name}: {why}", flush=True)
             continue
         with tempfile.TemporaryDirectory() as folder:
             row = row_of(case, case.make(Path(folder), told.workers))
-        rows.append(row)
+        text = written(path, [row], {})  # now, as the next one may take an hour
         print(f"{case.name}: {row['verdict']}, {row['seconds']:.0f} s", flush=True)
-    path = RESULTS / "real.json"
-    old = json.loads(path.read_text(encoding="utf-8")) if told.only is not None and path.exists() else {}
-    old["skipped"] = old.get("skipped") or {}
-    rows, skipped = joined(old, rows, skipped)
-    text = markdown(rows, skipped)
-    print("\n" + text)
-    content = json.dumps({"rows": rows, "skipped": skipped}, indent=1, ensure_ascii=False)
-    path.write_text(content + "\n", encoding="utf-8")
-    path.with_suffix(".md").write_text(text, encoding="utf-8")
-    print(f"wrote {path} and real.md")
+    print(f"\n{text}\nwrote {path} and real.md")
 
 
 if __name__ == "__main__":

@@ -92,6 +92,24 @@ def test_a_run_of_some_sets_leaves_the_others_as_they_were() -> None:
     assert rows[2] == {"set": "cable 1", "fitted": 1.0, **labels}
     assert skipped == {"cable 3": "there is no cable3.npz", "carried cloth": "there is none"}
     assert joined({}, new, skipped)[0] == [new[1], new[0]]
+    gone = {**labels, "rows": [{"set": "cable 1, guessed"}], "skipped": {"a sock": "there is none"}}
+    assert joined(gone, [], {}) == ([], {})
+
+
+def test_a_run_that_dies_keeps_the_rows_that_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def row_of(case: Case, _study: object) -> dict[str, Any]:
+        if case.name == "ball: tennis":
+            raise MemoryError
+        one = dict.fromkeys(COLUMNS, 0.1) | {"set": case.name, "fitted on": ["a"], "held out": ["b"]}
+        return one | {"verdict": "none: -", "rollouts": 1, "seconds": 2.0, "machine": "m"}
+
+    monkeypatch.setattr(real, "RESULTS", tmp_path)
+    monkeypatch.setattr(real, "row_of", row_of)
+    monkeypatch.setattr("sys.argv", ["real.py", "--only", "ball: whiffle", "ball: tennis"])
+    with pytest.raises(MemoryError):
+        real.main()
+    assert [r["set"] for r in json.loads((tmp_path / "real.json").read_text())["rows"]] == ["ball: whiffle"]
+    assert "ball: whiffle" in (tmp_path / "real.md").read_text()
 
 
 def study_of(rmse: float, simulations: int) -> Any:
