@@ -102,13 +102,17 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
 
 def _in_part(best: dict[str, Any], unit: str) -> str:
     """What a candidate is good for that is not the answer, where motions that it was not fitted to get better by it."""
-    before, after = best["held_out_before"], best["held_out_after"]
-    if best["explained"] < _WORTH_TELLING or before is None or not after < before:
+    if not _is_a_part(best):
         return ""
     return (
-        f" It is a part of the answer at most: with it the held-out error goes {length(before, unit)} → "
-        f"{length(after, unit)}."
+        f" It is a part of the answer at most: with it the held-out error goes "
+        f"{length(best['held_out_before'], unit)} → {length(best['held_out_after'], unit)}."
     )
+
+
+def _is_a_part(best: dict[str, Any]) -> bool:
+    before, after = best["held_out_before"], best["held_out_after"]
+    return best["explained"] >= _WORTH_TELLING and before is not None and after < before
 
 
 def _where(result: dict[str, Any]) -> str:
@@ -181,9 +185,11 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
     if verdict == "none" and study.problem.recordings[study.problem.fit_on[0]].series.unit == "px":
         return "To learn more: record points in metres; muslin unknown then estimates the missing force itself."
     if verdict == "none":
+        best = result["candidates"][0]
+        rest = f"; with muslin add {best['name']} {study.path} the rest may show" if _is_a_part(best) else ""
         return (
             f"To learn more: muslin unknown {study.path} estimates the missing force itself, shows it on the object, "
-            "and looks for a law."
+            f"and looks for a law{rest}."
         )
     if result["unfinished"]:
         return "To be sure: allow several times as many simulations ([diagnose] simulations), and diagnose again."

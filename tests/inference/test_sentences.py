@@ -1,11 +1,12 @@
 """What a diagnosis says in words, where a verdict alone would mislead."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _alternatives, _in_part, _unchecked, _verdict
+from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -42,6 +43,16 @@ def test_a_candidate_that_is_a_part_of_the_answer_is_told_with_what_it_is_good_f
     assert "8.3 mm → 6.5 mm" in _in_part(part, "m")
     for less in ({"explained": 0.1}, {"held_out_after": 0.0084}, {"held_out_before": None, "held_out_after": None}):
         assert not _in_part(part | less, "m")
+
+
+@pytest.mark.parametrize("explained, part", [(0.36, True), (0.1, False)])
+def test_what_to_do_with_a_part_of_the_answer_is_told(explained: float, part: bool) -> None:
+    take = SimpleNamespace(series=SimpleNamespace(unit="m"))
+    study = SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": take}))
+    best = {"name": "wind", "explained": explained, "held_out_before": 0.0083, "held_out_after": 0.0065}
+    told = _to_be_sure(study, {"verdict": "none", "candidates": [best]})  # type: ignore[arg-type]
+    assert "muslin unknown s.toml" in told
+    assert ("muslin add wind s.toml" in told) == part
 
 
 def test_held_out_motions_that_show_nothing_are_told() -> None:
