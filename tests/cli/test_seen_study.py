@@ -45,7 +45,7 @@ def test_a_rendered_take_is_found_again_in_a_simulation_of_it(tmp_path: Path, mu
     config.noise.sd = 2.0
     study.unlink()
     write_config(config, study)
-    for step, told in (("fit", "best fit"), ("compare", "of the squared error"), ("report", "wrote")):
+    for step, told in (("fit", "best fit"), ("compare", "the model is adequate"), ("report", "wrote")):
         done = muslin(step, str(study))
         assert done.returncode == 0 and told in (done.stdout + done.stderr).lower(), done.stderr
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_study import BODY, FRAMES, SD, SIDE, TIME, fitted, measured, scenario, swinging
-from scipy import stats
+from scipy import sparse, stats
 from scipy.optimize import lsq_linear
 
 from muslin.core.body import Body, cloth_grid, rope_line, solid_box
@@ -24,6 +24,7 @@ from muslin.inference.criticism.comparing.phases import MOTION, contact_labels, 
 from muslin.inference.criticism.comparing.replicates import NoiseDraws, Refit
 from muslin.inference.criticism.comparing.result import Comparison, Row
 from muslin.inference.criticism.comparing.sets import set_view
+from muslin.inference.criticism.comparing.statistics import Statistic
 from muslin.inference.criticism.comparing.views import two_views
 from muslin.inference.noise import Noise
 from muslin.inference.residuals import Offsets, residual
@@ -127,6 +128,13 @@ def test_a_refit_takes_out_what_least_squares_would_and_no_more_than_its_bounds_
     for row, left in zip(rows, near, strict=True):
         best = lsq_linear(jacobian, -row, (np.minimum(-unit, -1e-12), np.maximum(1 - unit, 1e-12))).x
         np.testing.assert_allclose(left, row + jacobian @ best, atol=1e-6)
+
+
+def test_a_model_without_any_error_shows_no_sign_of_a_misfit() -> None:
+    rows = sparse.csr_array(np.full((1, 4), 0.5))
+    for relative, expected in ((True, 1.0), (False, 0.0)):
+        of = Statistic("a sign", rows, relative).of(np.stack([np.zeros(4), np.ones(4)], axis=1))
+        np.testing.assert_allclose(of, [expected, 4.0])
 
 
 def test_replicated_noise_has_the_strength_and_the_colour_of_its_estimate() -> None:

@@ -33,9 +33,12 @@ class Statistic:
     relative: bool
 
     def of(self, residuals: FloatArray) -> FloatArray:
-        """Mean squares ``(R,)`` of residuals ``(N, R)``."""
+        """Mean squares ``(R,)`` of residuals ``(N, R)``; relative ones are one where there are no residuals at all."""
         mean = ((self.rows @ residuals) ** 2).mean(axis=0)
-        return np.asarray(mean / (residuals**2).mean(axis=0) if self.relative else mean)
+        if not self.relative:
+            return np.asarray(mean)
+        total = (residuals**2).mean(axis=0)
+        return np.asarray(np.divide(mean, total, out=np.ones_like(mean), where=total > 0.0))
 
 
 def all_statistics(takes: Sequence[Held], sorted_by: Sequence[Partition]) -> list[Statistic]:
