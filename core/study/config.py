@@ -75,7 +75,7 @@ class NoiseTable(StrictTable):
     """
 
     sd: float | None = Field(default=None, gt=0)
-    tails: float | None = Field(default=None, ge=1)
+    tails: float | None = Field(default=None, ge=1, le=1e6)
 
 
 class NuisanceTable(StrictTable):

@@ -181,7 +181,8 @@ def written(path: Path, rows: list[dict[str, Any]], skipped: Mapping[str, str]) 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--workers", type=int, default=None)
-    parser.add_argument("--only", nargs="*", help=f"of {', '.join(c.name for c in CASES)}; the others keep their rows")
+    known = [c.name for c in CASES]
+    parser.add_argument("--only", nargs="+", choices=known, metavar="SET", help=f"of {', '.join(known)}")
     told = parser.parse_args()
     path, text = RESULTS / "real.json", ""
     for case in CASES:

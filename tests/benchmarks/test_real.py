@@ -112,6 +112,16 @@ def test_a_run_that_dies_keeps_the_rows_that_it_has(tmp_path: Path, monkeypatch:
     assert "ball: whiffle" in (tmp_path / "real.md").read_text()
 
 
+def test_a_set_that_is_not_there_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(real, "RESULTS", tmp_path)
+    monkeypatch.setattr("sys.argv", ["real.py", "--only", "cable 9"])
+    with pytest.raises(SystemExit):
+        real.main()
+    assert "'cable 9'" in capsys.readouterr().err and not list(tmp_path.iterdir())
+
+
 def study_of(rmse: float, simulations: int) -> Any:
     noise = SimpleNamespace(sd=0.003, source="two repeats")
     return SimpleNamespace(

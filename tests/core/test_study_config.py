@@ -66,6 +66,8 @@ def test_values_of_the_wrong_kind() -> None:
     assert "[study.measurement] is missing" in complaint(study={})
     assert "[estimator.draws]" in complaint(estimator={"name": "x", "draws": 1})
     assert "[noise.sd]" in complaint(noise={"sd": -1.0})
+    for tails in (0.5, -3.0, 1e200, float("inf"), float("nan"), "wide"):
+        assert "[noise.tails]" in complaint(noise={"tails": tails})
 
 
 def test_obstacles_that_are_none() -> None:
