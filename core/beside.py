@@ -6,9 +6,29 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .motion import rotate
+from .twist import settled_twist, twist_by_ends
 
 #: How often the place of the axis is told anew from the markers and their frames.
 _ROUNDS = 4
+#: Frames are those of one recording.
+_ONE = np.zeros(1, np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class Natural:
+    """Natural curvature of a rope, in the axes of its material.
+
+    Args:
+        shares: of the length, rising ``(K,)`` [1].
+        curvature: there ``(K, 2)`` [1/m].
+    """
+
+    shares: FloatArray
+    curvature: FloatArray
+
+    def at(self, shares: FloatArray) -> FloatArray:
+        """At other ``shares (V,)`` of the length ``(V, 2)`` [1/m]."""
+        return np.stack([np.interp(shares, self.shares, k) for k in self.curvature.T], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +41,12 @@ class Beside:
         offsets: of the markers from the axis of the rope ``(M, 2)`` [m].
         turn: angle of the second gripper's z axis, seen from the first one's that was carried along, where the rope is
             not twisted [rad].
+        natural: curvature that the rope keeps, which takes part in how it twists; None: it is straight at rest.
     """
 
     offsets: FloatArray
     turn: float
+    natural: Natural | None = None
 
     def shifts(self, vertices: FloatArray, poses: FloatArray, markers: FloatArray) -> FloatArray:
         """What takes the markers ``(T, M, 3)`` [m] from the axis to where they stand.
@@ -34,48 +56,90 @@ class Beside:
             poses: of both grippers ``(T, 2, 7)``.
             markers: weights ``(M, V)`` of their places on the axis.
         """
-        frames = rope_frames(vertices, poses, self.turn)
+        frames = rope_frames(vertices, poses, self.turn, self.natural)
         return np.asarray(np.einsum("ma,mv,tvax->tmx", self.offsets, markers, frames))
 
-    def axis(self, points: FloatArray, poses: FloatArray) -> FloatArray:
+    def frames(self, points: FloatArray, poses: FloatArray, firsts: IntArray = _ONE) -> FloatArray:
+        """Axes of the cross-sections ``(T, M, 2, 3)`` at ``points (T, M, 3)`` on the axis."""
+        curve, places = curves(points)
+        return rope_frames(curve, poses, self.turn, self.natural, firsts)[:, places]
+
+    def twist_by_grippers(self, points: FloatArray, poses: FloatArray, firsts: IntArray = _ONE) -> FloatArray:
+        """By how much the :meth:`frames` turn about the rope as either gripper does ``(T, M, 2)`` [1]."""
+        curve, places = curves(points)
+        return _twisted(curve, poses, self.turn, self.natural, firsts)[3][:, places]
+
+    def twist(self, vertices: FloatArray, poses: FloatArray) -> float:
+        """By how much the grippers, at ``poses (2, 7)``, twist the rope of ``vertices (V, 3)`` [m] in all [rad]."""
+        angle = float(closing_angles(vertices[None], poses[None])[0]) - self.turn
+        return angle - 2 * np.pi * round(angle / (2 * np.pi))
+
+    def axis(self, points: FloatArray, poses: FloatArray, firsts: IntArray = _ONE) -> FloatArray:
         """Places on the axis ``(T, M, 3)`` [m] of markers seen at ``points (T, M, 3)`` [m].
 
-        NaN in frames that do not show every marker: nothing tells then how the rope lies.
+        NaN in frames that do not show every marker: nothing tells then how the rope lies. Frames of several recordings
+        that show every marker may follow one another, from ``firsts (R,)`` on.
         """
         whole = np.isfinite(points).all(axis=(1, 2))
         out = np.full(points.shape, np.nan)
         found = seen = points[whole]
         for _ in range(_ROUNDS if len(seen) else 0):
-            found = seen - np.einsum("ma,tmax->tmx", self.offsets, frames_at(found, poses[whole], self.turn))
+            found = seen - np.einsum("ma,tmax->tmx", self.offsets, self.frames(found, poses[whole], firsts))
         out[whole] = found
         return out
 
 
-def frames_at(points: FloatArray, poses: FloatArray, turn: float) -> FloatArray:
-    """:func:`rope_frames` ``(T, M, 2, 3)`` at ``points (T, M, 3)`` of a rope, on the smooth curves through them."""
-    curve, places = curves(points)
-    return rope_frames(curve, poses, turn)[:, places]
-
-
-def rope_frames(curve: FloatArray, poses: FloatArray, turn: float) -> FloatArray:
+def rope_frames(
+    curve: FloatArray, poses: FloatArray, turn: float, natural: Natural | None = None, firsts: IntArray = _ONE
+) -> FloatArray:
     r"""Two axes of the cross-section at every vertex of a rope ``(T, V, 2, 3)``, normal to it and to each other.
 
     At the first vertex the first axis is the z axis of the first gripper, at the last that of the second one, turned
     back by ``turn``. In between the frame is carried along without twist (Bishop 1975), and what the grippers twist the
-    rope by, :math:`\theta`, is spread evenly: at the length s of L it is :math:`\theta s / L`, as of a uniform rod
-    whose twist has settled (Bergou et al., *Discrete elastic rods*, 2008). From frame to frame it does not jump.
+    rope by, :math:`\theta`, has settled (Bergou et al., *Discrete elastic rods*, 2008): at the length s of L it is
+    :math:`\theta s / L` in a uniform rod that is straight at rest, and that of
+    :func:`~muslin.core.twist.settled_twist` in one that keeps a bend. From frame to frame it does not jump.
 
     Args:
         curve: vertices in order ``(T, V, 3)`` [m], neighbours apart.
         poses: of the grippers at the first and the last ``(T, 2, 7)``.
         turn: see :class:`Beside` [rad].
+        natural: likewise.
+        firsts: where frames of another recording begin ``(R,)``.
     """
-    carried, beside, share, angle = _carried(curve, poses)
-    angle = np.unwrap(angle - turn)
-    angle -= 2 * np.pi * np.round(angle[0] / (2 * np.pi))
-    twist = (angle[:, None] * share)[..., None]
+    carried, beside, twist, _ = _twisted(curve, poses, turn, natural, firsts)
+    twist = twist[..., None]
     turned = (np.cos(twist) * carried + np.sin(twist) * beside, np.cos(twist) * beside - np.sin(twist) * carried)
     return np.stack(turned, axis=2)
+
+
+def _twisted(
+    curve: FloatArray, poses: FloatArray, turn: float, natural: Natural | None, firsts: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Both axes without twist, the angles of the material ``(T, V)``, and what the ends' share is ``(T, V, 2)``."""
+    carried, beside, share, angle = _carried(curve, poses)
+    angle = np.unwrap(angle - turn)
+    whole = np.round(angle[firsts] / (2 * np.pi))
+    angle -= 2 * np.pi * np.repeat(whole, np.diff([*firsts, len(angle)]))
+    if natural is None:
+        return carried, beside, angle[:, None] * share, np.stack([1.0 - share, share], axis=2)
+    bends, lengths = bent_by(curve, carried, beside)
+    kept, ends = natural.at(share.mean(axis=0)[1:-1]), np.stack([0.0 * angle, angle], axis=1)
+    twist = settled_twist(bends, kept, lengths, ends)
+    return carried, beside, twist, twist_by_ends(bends, kept, lengths, twist)
+
+
+def bent_by(curve: FloatArray, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Curvatures ``(T, V - 2, 2)`` [1/m] along two axes ``(T, V, 3)``, and the lengths of segments ``(T, V - 1)`` [m].
+
+    The curvature vector stands across the plane of the bend; Bergou et al., *Discrete elastic rods*, 2008.
+    """
+    segments = np.diff(curve, axis=1)
+    lengths = np.linalg.norm(segments, axis=2)
+    before, behind = (segments / lengths[..., None])[:, :-1], (segments / lengths[..., None])[:, 1:]
+    vectors = 2.0 * np.cross(before, behind) / (1.0 + np.sum(before * behind, axis=2))[..., None]
+    vectors /= 0.5 * (lengths[:, 1:] + lengths[:, :-1])[..., None]
+    return np.stack([np.sum(vectors * axis[:, 1:-1], axis=2) for axis in (first, second)], axis=2), lengths
 
 
 def untwisted_frames(curve: FloatArray, poses: FloatArray) -> FloatArray:
@@ -109,7 +173,7 @@ def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArr
     return carried, beside, so_far / so_far[:, -1:], angle
 
 
-def curves(points: FloatArray, fine: int = 12) -> tuple[FloatArray, IntArray]:
+def curves(points: FloatArray, fine: int = 6) -> tuple[FloatArray, IntArray]:
     """Natural cubic splines through ``points (T, M, 3)``, ``fine`` steps from one to the next, over the mean chords.
 
     Returns:

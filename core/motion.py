@@ -37,6 +37,16 @@ def turned(quaternion: FloatArray, poses: FloatArray) -> FloatArray:
     return np.concatenate(made, axis=-1)
 
 
+def rolled(poses: FloatArray, axes: FloatArray, angles: FloatArray) -> FloatArray:
+    """``poses (..., G, 7)`` of grippers that are each turned by ``angles (G,)`` [rad] about an axis fixed in it.
+
+    The ``axes (G, 3)`` are unit vectors in the frames of the grippers.
+    """
+    half = 0.5 * angles[:, None]
+    turns = np.concatenate([np.cos(half), np.sin(half) * axes], axis=1)
+    return np.concatenate([poses[..., :3], multiply(poses[..., 3:], turns)], axis=-1)
+
+
 def turns_about(axes: FloatArray, quaternions: FloatArray) -> FloatArray:
     """By how much what turns about moving axes has turned about them ``(T,)`` [rad] since the first time.
 

@@ -166,7 +166,10 @@ class Scenario:
         still = (None, None)
         speeds, gains = still if self.start_motion is None else self.start_motion.along(len(body.vertices))
         earlier = None if self.earlier is None else scale * _on_mesh(self.earlier, len(body.vertices))
-        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start, speeds, gains, earlier)
+        twist = 0.0
+        if self.beside is not None and start is not None:
+            twist = self.beside.twist(start, self.motion.at(self.times[:1])[0])
+        return Scene(body, material, gravity, self.grasps, loads, self.obstacles, start, speeds, gains, earlier, twist)
 
     def held_positions(self, times: FloatArray, vertices: FloatArray) -> FloatArray:
         """Where the held vertices must be ``(T, H, 3)`` [m] at ``times (T,)`` [s].

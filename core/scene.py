@@ -29,6 +29,8 @@ class Scene:
             give; None: not known. Engines do not need them.
         earlier: shapes that a rope was in before, one after the other ``(H, V, 3)`` [m], wherever they were; None: not
             known. Engines do not need them; effects with a memory do.
+        start_twist: angle by which the last segment of a rope is turned about itself at time zero, seen from the first
+            one's material axes that are carried along without twist [rad].
     """
 
     body: Body
@@ -41,6 +43,7 @@ class Scene:
     start_velocities: FloatArray | None = None
     start_accelerations: FloatArray | None = None
     earlier: FloatArray | None = None
+    start_twist: float = 0.0
 
     def __post_init__(self) -> None:
         for what in ("start", "start_velocities", "start_accelerations"):

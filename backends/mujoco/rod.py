@@ -20,6 +20,8 @@ from ...core.scenario import STANDARD_GRAVITY
 _SMALLEST = 1e-12
 #: A rope that turns by less at rest is straight [rad].
 _STRAIGHT = 1e-6
+#: A segment lies as at rest if the cosine of its turn is that near one.
+_UNMOVED = 1e-12
 #: How much twist there is to reckon with in limp ropes, as a part of the bending rigidity.
 _LIMP = 0.2
 #: How much the coupling grows by a damping time of one step.
@@ -114,22 +116,35 @@ def aside(body: Body) -> FloatArray:
     return np.asarray(candidates[np.argmax(areas)])
 
 
-def start_twist(body: Body, start: FloatArray) -> float:
+def start_turn(body: Body, start: FloatArray, held: IntArray) -> float:
     """Angle [rad] by which all segments of a curved rope are turned about themselves at ``start (V, 3)``.
 
     MuJoCo starts with material frames that go from the first segment's rest direction to its present one by the
     shortest turn, and on from there without twist. A rope moved rigidly is at rest only if its frames turn
-    along; of all common turns this is the one that leaves the least bending energy.
+    along; of all common turns this is the one that leaves the least bending energy. A first segment that a gripper
+    holds as it lies at rest is not turned.
     """
     axis = np.eye(3)[np.argmin(np.abs(body.vertices[1] - body.vertices[0]))]
     rest, now = np.diff(body.vertices, axis=0), np.diff(start, axis=0)
     rest, now = (d / np.linalg.norm(d, axis=1, keepdims=True) for d in (rest, now))
+    if clamped_segments(body, held)[0] and rest[0] @ now[0] > 1.0 - _UNMOVED:
+        return 0.0
     u = np.cross(rest[0], axis)
     u /= np.linalg.norm(u)
     at_rest = _curvatures(rest, u)
     present = _curvatures(now, _carried(u, rest[0], now[0]))
     cross = np.sum(at_rest[:, 0] * present[:, 1] - at_rest[:, 1] * present[:, 0])
     return float(np.arctan2(cross, np.sum(at_rest * present))) if np.abs(at_rest).max(initial=0.0) > 1e-4 else 0.0
+
+
+def start_twists(body: Body, held: IntArray, twist: float) -> FloatArray:
+    """Angles of the segments ``(V - 1,)`` [rad], of a rope that is twisted by ``twist`` from its first to its last.
+
+    A uniform rope whose twist has settled is twisted evenly, but where it is clamped.
+    """
+    free = np.where(clamped_segments(body, held), 0.0, body.measures)
+    so_far = np.cumsum(0.5 * (free[:-1] + free[1:]))
+    return twist * np.concatenate([[0.0], so_far]) / max(float(so_far[-1]), _SMALLEST) if len(so_far) else np.zeros(1)
 
 
 def _curvatures(tangents: FloatArray, u: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from .engine import WARNINGS, engine
 from .gliding import Gliding, Thrown, TwoStep
 from .lengthening import Lengthening
 from .model import compiled
-from .rod import looking_back, start_twist
+from .rod import looking_back, start_turn, start_twists
 from .soft_bending import SoftBending
 
 #: How far beyond MuJoCo's own step, as a part of it, cloth and solids are thrown, see :class:`~.gliding.Thrown`; 1
@@ -51,7 +51,8 @@ class MujocoWorld(World):
         self._turn = made.turn
         self._moved[:] = self._inward(scene.start_positions - scene.body.vertices).ravel()
         if scene.body.kind == "rope" and scene.start is not None:
-            self._qpos[count:] = start_twist(scene.body, scene.start)
+            self._qpos[count:] = start_turn(scene.body, scene.start, scene.held)
+            self._qpos[count:] += start_twists(scene.body, scene.held, scene.start_twist)
         if scene.start_velocities is not None:
             self._qvel[:count] = self._inward(scene.start_velocities).ravel()
         self._commanded = made.commanded

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..bending import RopeBending
-from ..beside import untwisted_frames
+from ..beside import rope_frames, untwisted_frames
 from ..body import Body
 from ..kept_bend import KeptBend, kept_in
 from ..material import RopeMaterial
@@ -56,7 +56,7 @@ def bent(scenario: Scenario, curvature: FloatArray) -> Body:
     """
     body, start = scenario.body, scenario.start_vertices()
     poses = scenario.motion.at(scenario.times[:1])
-    frame = _frames(start, poses)[0]
+    frame = _frames(scenario, start)[0]
     turns = curvature * RopeBending(body, np.concatenate(scenario.grasps)).measures[:, None]
     points = rolled_out(start[0], np.cross(*frame), frame, turns, body.measures)
     return replace(body, vertices=rotate(inverse(poses[0, 0, 3:]), points - poses[0, 0, :3]))
@@ -84,10 +84,16 @@ def _told(scenario: Scenario) -> KeptBend:
     scene = scenario.scene(_ANY, np.zeros(3))
     bending = RopeBending(scene.body, scene.held)
     bending.follow(scene.start_positions)
-    frames = _frames(scene.start_positions, scenario.motion.at(scenario.times[:1]))
+    frames = _frames(scenario, scene.start_positions)
     return kept_in(scene, bending).turned(bending.axes, frames[1:-1])
 
 
-def _frames(vertices: FloatArray, poses: FloatArray) -> FloatArray:
-    """Axes ``(V, 2, 3)`` of the cross-sections that go along from the first gripper without twist."""
-    return np.asarray(untwisted_frames(vertices[None], poses[:, [0, -1]])[0])
+def _frames(scenario: Scenario, vertices: FloatArray) -> FloatArray:
+    """Axes ``(V, 2, 3)`` of the cross-sections at the start, which go along from the first gripper.
+
+    They are twisted as the material is where markers beside the axis show that, and without twist where nothing does.
+    """
+    poses = scenario.motion.at(scenario.times[:1])[:, [0, -1]]
+    if scenario.beside is None:
+        return np.asarray(untwisted_frames(vertices[None], poses)[0])
+    return np.asarray(rope_frames(vertices[None], poses, scenario.beside.turn, scenario.beside.natural)[0])

@@ -36,7 +36,7 @@ MEASURED_TAILS = 3.0
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200
 #: Parabolas through the first frames go through so many at least, and through none later than this [s].
-_FEWEST, _LONGEST = 5, 0.3
+_FEWEST, LONGEST = 5, 0.3
 #: They fit where they leave no more than this times the noise.
 _WITHIN = 1.5
 #: Shapes before the start are so far apart [s].
@@ -66,7 +66,7 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
             f"recording {recording.name!r}: every marker must be seen in the first frame, at least 3; start it later"
         )
     if beside is not None:
-        early = series.time - series.time[0] <= _LONGEST
+        early = series.time - series.time[0] <= LONGEST
         early[:_FEWEST] = True
         time = series.time[early]
         series = PointSeries(time, beside.axis(series.points[early], scenario.motion.at(time)))
@@ -121,7 +121,7 @@ def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
         places: of the markers along the rope ``(P,)`` [m].
     """
     time = series.time - series.time[0]
-    most = int(np.searchsorted(time, _LONGEST, side="right"))
+    most = int(np.searchsorted(time, LONGEST, side="right"))
     points = series.points[: max(most, _FEWEST)]
     noise = robust_sd(differences) if len(differences := fourth_differences(points)) else 0.0
     best: FloatArray | None = None

@@ -25,7 +25,7 @@ from ..scenarios import preset
 from ..scenarios.kept import told_bend
 from ..scenarios.measured import with_earlier
 from ..scenarios.spacing import told_places
-from ..scenarios.standoffs import told_standoffs
+from ..scenarios.standoffs import told_beside
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import ParameterTable, StudyConfig
@@ -153,10 +153,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
             f"[extractor]: {config.extractor.name!r} has not learned yet; name the file that muslin train wrote: "
             "weights = FILE"
         )
-    marked, beside = extractor.uses_markers, None
+    marked, beside, seen = extractor.uses_markers, None, recordings
     if config.scenario.markers == "beside":  # held-out recordings must not tell, here and below
-        beside = told_standoffs([recordings[n] for n in fit_on])
-    scenarios = {n: build_scenario(config.scenario, r, folder, marked, beside) for n, r in recordings.items()}
+        beside, seen = told_beside(recordings, fit_on)
+    scenarios = {n: build_scenario(config.scenario, r, folder, marked, beside) for n, r in seen.items()}
     if config.scenario.spacing is not None:
         if not marked:
             raise InputError(

@@ -20,6 +20,8 @@ from ..roughness import Roughness, roughness, unrepeatable
 
 #: A step that moves the model by more than this is told of [noise standard deviations].
 STEP_MATTERS = 1.0
+#: A rope that is turned in its grippers by more than this is told of [rad].
+TURN_MATTERS = 0.2
 #: Recordings that are left to chance are to be fitted in pieces of this length [s], or halves if they are shorter.
 PIECE = 1.25
 
@@ -53,7 +55,7 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
             + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
-    out += [*markers_beside(problem), *markers_elsewhere(problem, plain)]
+    out += [*markers_beside(problem), *rope_turned(problem), *markers_elsewhere(problem, plain)]
     if noise.source.startswith("roughness"):
         own = robust_sd(fourth_differences(plain[problem.fit_on[0]].series.points))
         if own > 0.5 * noise.sd:
@@ -117,6 +119,27 @@ def markers_beside(problem: Problem) -> list[str]:
     return [
         f"the distances between markers change as the rope bends as if these stood {1e3 * away:.2g} mm beside its "
         'axis; [scenario] markers = "beside" takes them to be there'
+    ]
+
+
+def rope_turned(problem: Problem) -> list[str]:
+    """That a rope is turned in its grippers, in a sentence, by more than their poses say."""
+    turned = []
+    for name in problem.fit_on:
+        scenario, said = problem.scenarios[name], problem.recordings[name].gripper
+        if scenario.beside is None or said is None:
+            return []
+        start = scenario.times[:1]
+        apart = np.sum(scenario.motion.at(start)[0, :, 3:] * said.at(start)[0, :, 3:], axis=1)
+        turned.append(2.0 * np.arccos(np.minimum(np.abs(apart), 1.0)))
+    first, last = np.sqrt(np.mean(np.square(turned), axis=0))
+    if max(first, last) <= TURN_MATTERS:
+        return []
+    return [
+        f"the distances between markers show the rope turned about itself in its grippers, by {first:.2g} rad in the "
+        f"first and {last:.2g} rad in the second (root mean square over the recordings), beyond what their poses say; "
+        "simulations start so, told in held-out recordings by how these start alone: record poses that say how the "
+        "grippers turn the rope, or mount it the same way each time"
     ]
 
 

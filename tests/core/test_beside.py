@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from muslin.core.arrays import FloatArray
-from muslin.core.beside import Beside, frames_at, rope_frames
+from muslin.core.beside import Beside, rope_frames
 from muslin.core.errors import InputError
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
-from muslin.core.motion import Motion, inverse, multiply, rotate
+from muslin.core.motion import Motion, inverse, multiply, rolled, rotate
 from muslin.core.scenarios.standoffs import told_standoffs
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
@@ -81,8 +81,12 @@ def offsets(seed: int) -> FloatArray:
     return made
 
 
-def recording(seed: int, beside: FloatArray, turn: float = 0.0, noise: float = 0.0) -> Recording:
+def recording(
+    seed: int, beside: FloatArray, turn: float = 0.0, noise: float = 0.0, rolls: tuple[float, float] = (0.0, 0.0)
+) -> Recording:
+    """A take in which the rope is turned in its grippers by ``rolls`` beyond what their poses say."""
     curve, axes, poses = rope(60, seed, turn)
+    poses = rolled(poses, np.array([X, -X]), -np.array(rolls))  # the second's x axis points against the rope
     points = markers(curve, axes, beside)
     points = points + np.random.default_rng(seed).normal(0.0, noise, points.shape)
     time = 0.1 * np.arange(60)
@@ -98,7 +102,9 @@ def test_frames_are_those_of_the_material(turn: float) -> None:
         np.einsum("tvax,tvbx->tvab", found, found), np.broadcast_to(np.eye(2), (*found.shape[:2], 2, 2)), atol=1e-9
     )
     at = np.rint(PLACES * FINE).astype(int)
-    np.testing.assert_allclose(frames_at(curve[:, at], poses, turn)[:, 2:-2], axes[:, at][:, 2:-2], atol=0.12)
+    np.testing.assert_allclose(
+        Beside(offsets(1), turn).frames(curve[:, at], poses)[:, 2:-2], axes[:, at][:, 2:-2], atol=0.12
+    )
 
 
 def test_frames_turn_with_the_rope() -> None:
@@ -127,7 +133,7 @@ def test_from_the_markers_to_the_axis_and_back() -> None:
 @pytest.mark.parametrize("turn", [0.0, 2.5])
 def test_bends_tell_where_markers_stand(turn: float) -> None:
     true = offsets(2)
-    found = told_standoffs([recording(k, true, turn, noise=1e-4) for k in (6, 7, 8)])
+    found = told_standoffs([recording(k, true, turn, noise=1e-4) for k in (6, 7, 8)]).beside
     off = np.angle(np.exp(1j * (found.turn - turn)))
     assert abs(off) < 0.1  # the twist of the takes has no mean of exactly zero
     assert np.sqrt(np.mean((found.offsets - true) ** 2)) < 0.004  # of 10 mm
@@ -136,12 +142,49 @@ def test_bends_tell_where_markers_stand(turn: float) -> None:
 def test_a_frame_with_two_markers_at_one_place_tells_nothing() -> None:
     take, true = recording(6, offsets(2)), offsets(2)
     take.series.points[20, 5] = take.series.points[20, 4]
-    found = told_standoffs([take, recording(7, true)])
+    found = told_standoffs([take, recording(7, true)]).beside
     assert np.sqrt(np.mean((found.offsets - true) ** 2)) < 0.004
 
 
+def test_distances_tell_how_a_rope_is_turned_in_its_grippers() -> None:
+    true = offsets(2)
+    given = {6: (0.0, 0.0), 7: (-0.9, 0.2), 8: (0.7, -0.3), 9: (0.3, 0.6), 10: (-0.1, -0.5)}
+    takes = {k: recording(k, true, noise=1e-4, rolls=r) for k, r in given.items()}
+    told = told_standoffs(list(takes.values()))
+    # what all takes have in common is where the markers stand
+    for until, near in ((np.inf, 0.1), (0.3, 0.3)):
+        found = told.rolls(list(takes.values()), until)
+        off = found - np.array(list(given.values()))
+        assert np.abs(off - off.mean(axis=0)).max() < near
+    angles = []
+    for k, take in zip(takes, told.turned(list(takes.values())), strict=True):
+        curve, axes, _ = rope(60, k)
+        assert take.gripper is not None
+        frames = rope_frames(curve, take.gripper.at(take.series.time), told.beside.turn)
+        angles.append(np.arctan2(*(np.einsum("tvx,tvx->tv", frames[:, :, 0], axes[:, :, a]) for a in (1, 0))))
+    turned = np.exp(1j * np.array(angles))
+    assert np.abs(np.angle(turned / turned.mean(axis=(0, 1)))).max() < 0.1
+
+
+def test_grippers_that_say_how_they_are_turned_are_left_as_they_are() -> None:
+    takes = [recording(k, offsets(2), noise=1e-4) for k in (6, 7, 8, 9)]
+    told = told_standoffs(takes)
+    for until, near in ((np.inf, 0.02), (0.3, 0.1)):
+        assert np.abs(told.rolls(takes, until)).max() < near
+
+
+def test_a_recording_that_shows_nothing_leaves_its_grippers_as_they_are() -> None:
+    told = told_standoffs([recording(k, offsets(2)) for k in (6, 7)])
+    hidden = recording(8, offsets(2), rolls=(0.5, 0.5))
+    hidden.series.points[:20, 4] = np.nan
+    assert (told.rolls([hidden], 0.3) == 0.0).all()
+    both = told.rolls([hidden, recording(9, offsets(2))], 0.3)
+    assert (both[0] == 0.0).all()
+    assert np.abs(told.rolls([hidden])).max() > 0.3
+
+
 def test_markers_on_the_axis_are_told_to_be_there() -> None:
-    found = told_standoffs([recording(k, np.zeros((len(PLACES), 2)), noise=1e-4) for k in (6, 7)])
+    found = told_standoffs([recording(k, np.zeros((len(PLACES), 2)), noise=1e-4) for k in (6, 7)]).beside
     assert np.abs(found.offsets).max() < 0.002
 
 

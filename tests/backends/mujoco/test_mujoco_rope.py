@@ -143,6 +143,31 @@ def test_a_straight_rope_started_bent_straightens():
     assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(0.4, rel=1e-3)
 
 
+def test_a_rope_that_starts_twisted_stays_where_turning_its_end_has_taken_it():
+    """Slack between two grippers, of which the second turns it about itself by 4 rad: it comes out of its plane."""
+    x, count, twist = np.linspace(-0.15, 0.15, 21), 21, 4.0
+    body = _rope(np.stack([x, 0 * x, 0.35 * np.cosh(x / 0.1) / np.cosh(1.5)], axis=1))
+    straight = rope_line(np.array([[0.0, 0.0, 0.0], [body.measures.sum(), 0.0, 0.0]]), count)
+    held = np.array([0, 1, count - 2, count - 1])
+    material = RopeMaterial(0.05, 1e4, 1e-3, 1e-3, damping_time=0.01)
+    ends = body.vertices[held]
+    what = scene(straight, material, held=held, start=body.vertices)
+    with opened(what, time_step=0.0025) as world:
+        for t in np.linspace(0.0, 1.0, 400):
+            world.step(ends, None, None, np.array([0.0, twist * t]))
+        for _ in range(2000):
+            world.step(ends, -8.0 * world.masses[:, None] * world.state().velocities, None, np.array([0.0, twist]))
+        turned = world.state().positions.copy()
+    assert np.abs(turned[:, 1]).max() > 0.005
+
+    def moved(start_twist):
+        with opened(replace(what, start=turned, start_twist=start_twist), time_step=0.0025) as world:
+            return np.abs(run(world, 0.5, ends) - turned).max()
+
+    assert moved(0.0) > 0.005
+    assert moved(twist) < 0.1 * moved(0.0)
+
+
 @pytest.mark.parametrize("vertices", [2, 3])
 def test_the_shortest_ropes_fall(vertices):
     """By g t^2 / 2, and 3/2 of what the first step is off by, which is thrown on from 1 / 1.7 of it."""
