@@ -23,7 +23,7 @@ CAPABILITIES: dict[str, str] = {
     "curved-rest": "make an object whose rest shape is not flat or straight",
     "start-shape": "start from a shape that is not the rest shape",
     "start-velocity": "start in motion",
-    "twist": "make a rope that resists torsion",
+    "twist": "make a rope that resists torsion, and starts twisted",
     "varying-stiffness": "change the stretch stiffness of elements during a rollout",
     "contact-forces": "tell the forces of the obstacles on the vertices",
 }

@@ -50,9 +50,9 @@ class MujocoWorld(World):
         self._rest = scene.body.vertices.ravel()
         self._turn = made.turn
         self._moved[:] = self._inward(scene.start_positions - scene.body.vertices).ravel()
-        if scene.body.kind == "rope" and scene.start is not None:
-            self._qpos[count:] = start_turn(scene.body, scene.start, scene.held)
-            self._qpos[count:] += start_twists(scene.body, scene.held, scene.start_twist)
+        if scene.body.kind == "rope":
+            turned = start_turn(scene.body, scene.start_positions, scene.held)
+            self._qpos[count:] = turned + start_twists(scene.body, scene.held, scene.start_twist)
         if scene.start_velocities is not None:
             self._qvel[:count] = self._inward(scene.start_velocities).ravel()
         self._commanded = made.commanded

@@ -198,6 +198,33 @@ def check_turns(make: MakeSimulator, kind: str) -> None:
     with_world(make(), scene, lambda world: look(world, scene))
 
 
+def check_start_twist(make: MakeSimulator, kind: str) -> None:
+    """A quarter of a circle that starts twisted between two clamps comes to rest where turning one of them takes it.
+
+    By 2 rad; to 5 % of how far that is.
+    """
+    angle, free = 2.0, _hoop(1e-2)
+    clamped = replace(free, grasps=(np.array([0, 1]), np.array([15, 16])))
+    held, found = clamped.body.vertices[clamped.held], []
+
+    def look(world: World, turns: FloatArray) -> None:
+        for _ in range(round(1.5 / world.time_step)):
+            world.step(held, -8.0 * world.masses[:, None] * world.state().velocities, turns=turns)
+        found.append(world.state().positions.copy())
+
+    for start_twist in (0.0, angle):
+        turns = np.array([0.0, angle - start_twist])
+        scene = replace(clamped, start_twist=start_twist)
+        with_world(make(), scene, lambda world, turns=turns: look(world, turns))  # type: ignore[misc]
+    moved = float(np.abs(found[0] - clamped.body.vertices).max())
+    off = float(np.abs(found[1] - found[0]).max())
+    must(
+        off < 0.05 * moved,
+        f"started twisted by {angle:g} rad it comes to rest {1e3 * off:.2g} mm from where turning its clamp takes it, "
+        f"which is {1e3 * moved:.2g} mm away",
+    )
+
+
 ABILITIES: tuple[Ability, ...] = (
     *(
         Ability(
@@ -232,7 +259,11 @@ ABILITIES: tuple[Ability, ...] = (
     Ability("start-velocity", {"starts in motion": check_start_velocity}, _thrown),
     Ability(
         "twist",
-        {"resists torsion": check_twist, "turns with what holds it": check_turns},
+        {
+            "resists torsion": check_twist,
+            "turns with what holds it": check_turns,
+            "starts twisted": check_start_twist,
+        },
         None,
         ("rope",),
         frozenset({"curved-rest"}),

@@ -207,6 +207,20 @@ def test_torsion_that_is_only_claimed_is_caught() -> None:
     assert "of a quarter of the twist rigidity gives way 1.00 times as much, not 1.94" in complaint
 
 
+def test_a_twist_at_the_start_that_is_left_out_is_caught() -> None:
+    pytest.importorskip("mujoco")
+    from muslin.backends.mujoco import MujocoSimulator
+
+    class Starts(MujocoSimulator):
+        def open(self, scene: Scene) -> World:
+            return super().open(replace(scene, start_twist=0.0))
+
+    assert complaints(MujocoSimulator, "starts twisted")["rope"] is None
+    complaint = complaints(Starts, "starts twisted")["rope"]
+    assert complaint is not None
+    assert "started twisted by 2 rad it comes to rest" in complaint
+
+
 def test_a_simulator_that_cannot_travel() -> None:
     class Local(ReferenceSimulator):
         pass
