@@ -1,6 +1,8 @@
 """Markers that stand beside the axis of a rope, and turn with its material."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -67,7 +69,7 @@ class Beside:
     def twist_by_grippers(self, points: FloatArray, poses: FloatArray, firsts: IntArray = _ONE) -> FloatArray:
         """By how much the :meth:`frames` turn about the rope as either gripper does ``(T, M, 2)`` [1]."""
         curve, places = curves(points)
-        return _twisted(curve, poses, self.turn, self.natural, firsts)[3][:, places]
+        return _twisted(curve, poses, self.turn, self.natural, firsts)[3]()[:, places]
 
     def twist(self, vertices: FloatArray, poses: FloatArray) -> float:
         """By how much the grippers, at ``poses (2, 7)``, twist the rope of ``vertices (V, 3)`` [m] in all [rad]."""
@@ -115,18 +117,18 @@ def rope_frames(
 
 def _twisted(
     curve: FloatArray, poses: FloatArray, turn: float, natural: Natural | None, firsts: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Both axes without twist, the angles of the material ``(T, V)``, and what the ends' share is ``(T, V, 2)``."""
+) -> tuple[FloatArray, FloatArray, FloatArray, Callable[[], FloatArray]]:
+    """Both axes without twist, the angles of the material ``(T, V)``, and what gives the ends' share ``(T, V, 2)``."""
     carried, beside, share, angle = _carried(curve, poses)
     angle = np.unwrap(angle - turn)
     whole = np.round(angle[firsts] / (2 * np.pi))
     angle -= 2 * np.pi * np.repeat(whole, np.diff([*firsts, len(angle)]))
     if natural is None:
-        return carried, beside, angle[:, None] * share, np.stack([1.0 - share, share], axis=2)
+        return carried, beside, angle[:, None] * share, lambda: np.stack([1.0 - share, share], axis=2)
     bends, lengths = bent_by(curve, carried, beside)
     kept, ends = natural.at(share.mean(axis=0)[1:-1]), np.stack([0.0 * angle, angle], axis=1)
     twist = settled_twist(bends, kept, lengths, ends)
-    return carried, beside, twist, twist_by_ends(bends, kept, lengths, twist)
+    return carried, beside, twist, partial(twist_by_ends, bends, kept, lengths, twist)
 
 
 def bent_by(curve: FloatArray, first: FloatArray, second: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -137,7 +139,7 @@ def bent_by(curve: FloatArray, first: FloatArray, second: FloatArray) -> tuple[F
     segments = np.diff(curve, axis=1)
     lengths = np.linalg.norm(segments, axis=2)
     before, behind = (segments / lengths[..., None])[:, :-1], (segments / lengths[..., None])[:, 1:]
-    vectors = 2.0 * np.cross(before, behind) / (1.0 + np.sum(before * behind, axis=2))[..., None]
+    vectors = 2.0 * np.cross(before, behind) / np.maximum(1.0 + np.sum(before * behind, axis=2), 1e-9)[..., None]
     vectors /= 0.5 * (lengths[:, 1:] + lengths[:, :-1])[..., None]
     return np.stack([np.sum(vectors * axis[:, 1:-1], axis=2) for axis in (first, second)], axis=2), lengths
 

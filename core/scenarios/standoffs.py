@@ -179,17 +179,20 @@ def _stepped(now: Beside, rolls: FloatArray, frames: Frames) -> tuple[Beside, Fl
     change = np.concatenate([by_offsets[:, :, 1:-1].reshape(*off.shape, -1), own.reshape(*off.shape, -1)], axis=2)
     change -= change.mean(axis=0)  # the lengths are not known either
     keep = np.sqrt(_WEIGHT) * spread / np.repeat([_USUAL, _USUAL_ROLL], [len(inner), rolls.size])
-    gate = np.array([_gate(off[frames.owner == r], spread) for r in range(len(rolls))])[frames.owner]
-    step = _step(off, change, gate, keep, np.concatenate([inner, rolls.ravel()]))
+    gates, seen = np.zeros(len(rolls)), np.unique(frames.owner)
+    gates[seen] = [_gate(off[frames.owner == r], spread) for r in seen]
+    step = _step(off, change, gates[frames.owner], keep, np.concatenate([inner, rolls.ravel()]))
     offsets = (inner + step[: len(inner)]).reshape(-1, 2)
     turns = np.clip(step[len(inner) :].reshape(rolls.shape), -_LARGEST_STEP, _LARGEST_STEP)
     # what all recordings are rolled by is where the markers stand: no rope is twisted for good
-    common = (rolls + turns).mean(axis=0)
+    rolls = rolls + turns
+    common = rolls[seen].mean(axis=0)
+    rolls[seen] -= common  # those that show no frame stay at zero
     so_far = np.concatenate([[0.0], np.cumsum(known)])
     angle = common[0] + (common[1] - common[0]) * so_far / so_far[-1]
     x, y = np.concatenate([offsets[:1], offsets, offsets[-1:]]).T
     told = np.stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y], axis=1)
-    return replace(now, offsets=told), rolls + turns - common, known, spread
+    return replace(now, offsets=told), rolls, known, spread
 
 
 def _natural(beside: Beside, frames: Frames, rolls: FloatArray) -> Natural:

@@ -1,5 +1,6 @@
 """Markers that stand beside the axis of a rope: frames, the way there and back, and what bends tell of them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,13 @@ import pytest
 from muslin.core.arrays import FloatArray
 from muslin.core.beside import Beside, rope_frames
 from muslin.core.errors import InputError
+from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.motion import Motion, inverse, multiply, rolled, rotate
+from muslin.core.scenarios import preset
+from muslin.core.scenarios.kept import told_bend
+from muslin.core.scenarios.measured import measured_start
 from muslin.core.scenarios.standoffs import told_standoffs
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
@@ -181,6 +186,54 @@ def test_a_recording_that_shows_nothing_leaves_its_grippers_as_they_are() -> Non
     both = told.rolls([hidden, recording(9, offsets(2))], 0.3)
     assert (both[0] == 0.0).all()
     assert np.abs(told.rolls([hidden])).max() > 0.3
+
+
+def test_a_recording_without_a_whole_frame_changes_nothing() -> None:
+    takes = [recording(k, offsets(2), noise=1e-4, rolls=(0.3 * (k - 7), 0.0)) for k in (6, 7, 8)]
+    none = recording(9, offsets(2))
+    none.series.points[:, 4] = np.nan
+    alone, beside = told_standoffs(takes), told_standoffs([*takes, none])
+    np.testing.assert_allclose(beside.beside.offsets, alone.beside.offsets, atol=1e-9)
+    assert (beside.rolls([none]) == 0.0).all()
+    (again,) = beside.turned([none])
+    assert again.gripper is not None
+    assert none.gripper is not None
+    np.testing.assert_allclose(again.gripper.poses, none.gripper.poses, atol=1e-12)
+
+
+def test_a_scene_starts_as_twisted_as_the_rope_is_then() -> None:
+    for seed in (3, 8):
+        _, _, poses = rope(60, seed, 0.4)
+        take = recording(seed, np.zeros((len(PLACES), 2)), 0.4)
+        plain = preset("cable").scenario((LENGTH,), (41,)).for_recording(take)
+        material = RopeMaterial()
+        assert measured_start(plain, take).scene(material, np.zeros(3)).start_twist == 0.0
+        beside = Beside(np.zeros((len(PLACES), 2)), 0.4)
+        started = measured_start(plain, take, beside).scene(material, np.zeros(3)).start_twist
+        assert started == pytest.approx(0.6 * np.sin(seed), abs=0.05)
+        assert beside.twist(rope(1, seed)[0][0], poses[0]) == pytest.approx(0.6 * np.sin(seed), abs=0.05)
+
+
+def test_a_kept_bend_is_told_in_axes_that_are_twisted_as_the_rope_is() -> None:
+    """In axes that are turned by an angle the same bend has numbers that are turned back by it."""
+    take = recording(3, np.zeros((len(PLACES), 2)))
+    plain = preset("cable").scenario((LENGTH,), (41,)).for_recording(take)
+
+    def told(turn: float) -> FloatArray:
+        scenario = measured_start(plain, take, Beside(np.zeros((len(PLACES), 2)), turn))
+        kept = told_bend([replace(scenario, times=take.series.time[:5])], [first_frames])
+        assert kept is not None
+        return kept.shape
+
+    short = replace(take.series, time=take.series.time[:5], points=take.series.points[:5])
+    first_frames = replace(take, series=short)
+    one, other = told(0.0), told(0.5)
+    # a turn that is larger by 0.5 rad is a twist that is smaller by it
+    angle = 0.5 * np.arange(1, 40) / 40
+    c, s = np.cos(angle), np.sin(angle)
+    back = np.stack([c * one[:, 0] - s * one[:, 1], s * one[:, 0] + c * one[:, 1]], axis=1)
+    np.testing.assert_allclose(other, back, atol=0.02 * np.abs(one).max())
+    assert np.abs(other - one).max() > 0.1 * np.abs(one).max()
 
 
 def test_markers_on_the_axis_are_told_to_be_there() -> None:

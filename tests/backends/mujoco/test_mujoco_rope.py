@@ -132,6 +132,18 @@ def test_a_helix_is_at_rest_where_it_was_made_and_wherever_it_was_taken(turned):
         np.testing.assert_allclose(run(world, 0.5), start, atol=1e-9)
 
 
+def test_a_clamp_says_how_a_bent_rope_is_turned_and_not_how_it_starts():
+    """Started in another plane than that in which it is bent at rest, it comes back into its own."""
+    angle = np.linspace(0.0, 1.2, 13)
+    arc = 0.2 * np.stack([np.sin(angle), 1 - np.cos(angle), 0 * angle], axis=1)
+    body = _rope(np.concatenate([[[-0.02, 0.0, 0.0]], arc]))
+    start = body.vertices[:, [0, 1, 1]] * [1.0, np.cos(0.9), np.sin(0.9)]
+    material = RopeMaterial(0.05, 1e4, 1e-2, 1e-2, damping_time=0.01)
+    with opened(scene(body, material, held=np.array([0, 1]), gravity=NO_GRAVITY, start=start)) as world:
+        final = run(world, 3.0, body.vertices[:2], brake=8.0)
+    np.testing.assert_allclose(final, body.vertices, atol=0.004)
+
+
 def test_a_straight_rope_started_bent_straightens():
     straight = rope_line(np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), 17)
     angle = straight.vertices[:, 0] / 0.2
