@@ -1,5 +1,6 @@
 """The bend that a rope keeps where nothing acts on it, as it follows from a state that it was seen in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,8 @@ from .scene import Scene
 
 #: Singular values below this share of the largest one count as zero.
 _RANK = 1e-9
+#: What less than this share of the states tell is hardly told.
+_HARDLY = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +39,57 @@ class KeptBend:
         moments = carried[0] - np.tensordot(gravity, carried[1:], 1)
         return np.asarray(self.shape + material.damping_time * self.rates - moments / material.bending_rigidity)
 
-    def turned(self, axes: FloatArray, into: FloatArray) -> "KeptBend":
+
+@dataclass(frozen=True, eq=False)
+class StateBend:
+    """What one state of a rope tells of the bend that it keeps.
+
+    Args:
+        least: the smallest one that is in balance, in the mean square along the rope.
+        ways: what may come on top of it, for all that this state tells, as what the grippers give at the ends remains
+            open ``(N, 2, W)``; orthonormal in that mean.
+        measures: lengths that the curvatures stand for ``(N,)`` [m].
+    """
+
+    least: KeptBend
+    ways: FloatArray
+    measures: FloatArray
+
+    def turned(self, axes: FloatArray, into: FloatArray) -> "StateBend":
         """The same in other cross-section axes: from ``axes (N, 2, 3)`` into ``into (N, 2, 3)``."""
         turn = np.einsum("nax,nbx->nab", axes, into)
-        return KeptBend(*(np.einsum("...na,nab->...nb", x, turn) for x in (self.shape, self.rates, self.moments)))
-
-    @staticmethod
-    def mean(told: "list[KeptBend]") -> "KeptBend":
-        """The mean over several states of one rope."""
-        return KeptBend(
-            np.mean([t.shape for t in told], axis=0),
-            np.mean([t.rates for t in told], axis=0),
-            np.mean([t.moments for t in told], axis=0),
-        )
+        old = self.least
+        least = KeptBend(*(np.einsum("...na,nab->...nb", x, turn) for x in (old.shape, old.rates, old.moments)))
+        return StateBend(least, np.einsum("naw,nab->nbw", self.ways, turn), self.measures)
 
 
-def kept_in(scene: Scene, bending: RopeBending) -> KeptBend:
+def common_bend(states: Sequence[StateBend]) -> KeptBend:
+    """The one bend that all ``states`` of a rope tell together, in axes that are the same in all.
+
+    Each tells it but for its ways, which are other ones where the rope lies otherwise, so together they tell more
+    than any one does; the mean of the smallest bends falls short by what each leaves open. What hardly any state tells,
+    as an even bend between two clamps, stays as small as it may be: the states' errors would fill it otherwise.
+    """
+    weights = [np.sqrt(np.repeat(s.measures, 2))[:, None] for s in states]
+    count = len(weights[0])
+    told = np.mean([w * _columns(s.least) for w, s in zip(weights, states, strict=True)], axis=0)
+    ways = [w * s.ways.reshape(count, -1) for w, s in zip(weights, states, strict=True)]
+    seen = np.eye(count) - np.mean([w @ w.T for w in ways], axis=0)
+    common = np.linalg.solve(seen + _HARDLY * np.eye(count), (1.0 + _HARDLY) * told)
+    return _from_columns(common / np.mean(weights, axis=0))
+
+
+def _columns(bend: KeptBend) -> FloatArray:
+    """All that it is made of ``(2 N, 10)``."""
+    return np.concatenate([x.reshape(-1, bend.shape.size) for x in (bend.shape, bend.rates, bend.moments)]).T
+
+
+def _from_columns(columns: FloatArray) -> KeptBend:
+    shape, rates, *moments = columns.T.reshape(10, -1, 2)
+    return KeptBend(shape, rates, np.reshape(moments, (2, 4, *shape.shape)))
+
+
+def kept_in(scene: Scene, bending: RopeBending) -> StateBend:
     r"""What follows from the start of a scene, in the axes of ``bending``, which has been followed there.
 
     At a free vertex mass times acceleration is the sum of weight, tension and the forces of the bending moments m,
@@ -90,5 +128,4 @@ def kept_in(scene: Scene, bending: RopeBending) -> KeptBend:
     ways = ways[:, extents > _RANK * weight.max()]  # what is left open may be tension alone, as of a held segment
     told = np.stack([bending.curvature.ravel(), bending.rates(moving).ravel(), *balanced[: 2 * places].T], axis=1)
     least = told - (ways @ (ways.T @ (weight * told))) / weight
-    shape, rates, *moments = least.T.reshape(10, places, 2)
-    return KeptBend(shape, rates, np.reshape(moments, (2, 4, places, 2)))
+    return StateBend(_from_columns(least), (ways / weight).reshape(places, 2, -1), bending.measures)

@@ -9,7 +9,7 @@ from ..arrays import FloatArray
 from ..bending import RopeBending
 from ..beside import rope_frames, untwisted_frames
 from ..body import Body
-from ..kept_bend import KeptBend, kept_in
+from ..kept_bend import KeptBend, StateBend, common_bend, kept_in
 from ..material import RopeMaterial
 from ..measurement import Recording
 from ..motion import inverse, rotate
@@ -27,7 +27,7 @@ _ANY = RopeMaterial(linear_density=1.0, stretch_stiffness=1.0, bending_rigidity=
 
 
 def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) -> KeptBend | None:
-    """The mean over states all along ``recordings`` of one rope, in the frames of :func:`untwisted_frames`.
+    """What states all along ``recordings`` of one rope tell together, in the frames of the material.
 
     A natural curvature is a property of the rope and turns with its material, which the first gripper holds; what
     friction between its strands and errors of the markers add differs from state to state. States far off are left out.
@@ -43,10 +43,10 @@ def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) ->
         return None
     states = [state for s, r in zip(scenarios, recordings, strict=True) for state in _states(s, r)]
     told = [_told(s) for s in states]
-    shapes = np.array([t.shape for t in told])
+    shapes = np.array([t.least.shape for t in told])
     away = np.sqrt(np.mean((shapes - np.median(shapes, axis=0)) ** 2, axis=(1, 2)))
     usual = _FAR * float(np.median(away))
-    return KeptBend.mean([t for t, a in zip(told, away, strict=True) if a <= usual])
+    return common_bend([t for t, a in zip(told, away, strict=True) if a <= usual])
 
 
 def bent(scenario: Scenario, curvature: FloatArray) -> Body:
@@ -79,7 +79,7 @@ def _states(scenario: Scenario, recording: Recording) -> list[Scenario]:
     return out
 
 
-def _told(scenario: Scenario) -> KeptBend:
+def _told(scenario: Scenario) -> StateBend:
     """From the start of one; by unit of mass and gravity, so neither the material nor gravity counts."""
     scene = scenario.scene(_ANY, np.zeros(3))
     bending = RopeBending(scene.body, scene.held)

@@ -16,13 +16,13 @@ class RestCurvature(Effect):
 
     In every state the bending moments are in balance with weight, inertia and tension, and the curvature that they do
     not account for is the rope's own: :func:`~muslin.core.kept_bend.kept_in`. It turns with the material and is the
-    same in all recordings, so the mean over states all along those that are fitted is taken:
+    same in all recordings, so states all along those that are fitted tell it together:
     :func:`~muslin.core.scenarios.kept.told_bend`. The simulator is given a rope that is bent by ``share`` times that
     where nothing acts on it: 1 is in balance in the mean.
 
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
-        inverse dynamic curves*, 2010, for rods; the accelerations and the mean over states are added here.
+        inverse dynamic curves*, 2010, for rods; the accelerations and what states tell together are added here.
     """
 
     name: ClassVar[str] = "rest-curvature"

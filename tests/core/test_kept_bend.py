@@ -11,7 +11,7 @@ from muslin.core.arrays import FloatArray
 from muslin.core.bending import RopeBending
 from muslin.core.beside import untwisted_frames
 from muslin.core.body import rope_line
-from muslin.core.kept_bend import kept_in
+from muslin.core.kept_bend import StateBend, common_bend, kept_in
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion, rotate
@@ -38,7 +38,7 @@ def test_an_arc_without_weight_is_all_natural_curvature_or_none() -> None:
     def bend_of(scene: Scene) -> FloatArray:
         bending = RopeBending(body, scene.held)
         bending.follow(arc)
-        return kept_in(scene, bending).curvature(MATERIAL, scene.gravity)
+        return kept_in(scene, bending).least.curvature(MATERIAL, scene.gravity)
 
     # clamped at one end alone nothing but its own bend can hold it in this shape; clamped at both the ends can
     np.testing.assert_allclose(np.linalg.norm(bend_of(free), axis=1)[:-1], 1.0, rtol=1e-6)
@@ -52,10 +52,10 @@ def test_what_moves_freely_needs_no_bend() -> None:
     held = (np.array([0, 1]),)
     falling = Scene(body, MATERIAL, gravity, held, np.zeros(21), start_accelerations=np.tile(gravity, (21, 1)))
     bending = RopeBending(body, falling.held)
-    assert np.abs(kept_in(falling, bending).curvature(MATERIAL, gravity)).max() < 1e-9
+    assert np.abs(kept_in(falling, bending).least.curvature(MATERIAL, gravity)).max() < 1e-9
     still = replace(falling, start_accelerations=None)
     # at rest, sticking out from the clamp, its bend carries the weight of all that is beyond: m = w (l - x)^2 / 2
-    moment = 2e-3 * np.linalg.norm(kept_in(still, bending).curvature(MATERIAL, gravity), axis=1)
+    moment = 2e-3 * np.linalg.norm(kept_in(still, bending).least.curvature(MATERIAL, gravity), axis=1)
     np.testing.assert_allclose(moment, 0.05 * 9.81 * 0.5 * (1.0 - np.arange(1, 20) / 20) ** 2, rtol=1e-6)
 
 
@@ -77,7 +77,7 @@ def test_what_damping_gives_is_no_bend() -> None:
         start_velocities=velocities,
         start_accelerations=forces / masses[:, None],
     )
-    kept = kept_in(bent, bending)
+    kept = kept_in(bent, bending).least
     assert np.abs(kept.curvature(replace(MATERIAL, damping_time=beta), bent.gravity)).max() < 1e-9
     undamped = kept.curvature(MATERIAL, bent.gravity)
     assert np.abs(undamped).max() > 0.5 * beta * np.abs(bending.rates(velocities)).max()
@@ -124,6 +124,54 @@ def test_a_bent_body_has_the_curvature_that_it_was_given(size: float) -> None:
     frames = untwisted_frames(world[None], scenario.motion.at(scenario.times[:1])[:, [0, 0]])[0, 1:-1]
     got = np.einsum("na,nax,nbx->nb", bending.rest, bending.axes, frames)
     np.testing.assert_allclose(got, wanted, atol=0.02 * size)
+
+
+def states_of(kept: FloatArray, count: int, errors: float = 0.0) -> list[StateBend]:
+    """What random states of a rope that two clamps hold, in balance with its own bend ``kept``, tell of it."""
+    rng = np.random.default_rng(2)
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 26)
+    grasps = (np.array([0, 1]), np.array([24, 25]))
+    gravity = np.array([0.0, 0.0, -9.81])
+    out = []
+    for turn in rng.normal(size=(count, 4)):
+        pose = np.concatenate([np.zeros(3), turn / np.linalg.norm(turn)])
+        along = np.linspace(0.0, 1.0, 25)[:, None, None]
+        waves = np.sum(rng.normal(size=(1, 3, 2)) * np.sin(np.pi * along * np.arange(1, 4)[:, None]), axis=1)
+        directions = np.concatenate([np.ones((25, 1)), waves], axis=1)
+        directions *= 0.04 / np.linalg.norm(directions, axis=1, keepdims=True)
+        points = np.concatenate([np.zeros((1, 3)), np.cumsum(rotate(pose[3:], directions), axis=0)])
+        bending = RopeBending(body, np.concatenate(grasps))
+        bending.follow(points)
+        frames = untwisted_frames(points[None], np.tile(pose, (1, 2, 1)))[0, 1:-1]
+        own = np.einsum("na,nax,nbx->nb", kept, frames, bending.axes)
+        own += errors * rng.normal(size=own.shape)
+        forces = bending.forces(2e-3 * (bending.curvature - own))
+        accelerations = forces / (0.05 * body.vertex_measures)[:, None] + gravity
+        scene = Scene(body, MATERIAL, gravity, grasps, np.zeros(26), (), points, start_accelerations=accelerations)
+        out.append(kept_in(scene, bending).turned(bending.axes, frames))
+    return out
+
+
+def rms(curvature: FloatArray) -> float:
+    return float(np.sqrt(np.mean(curvature**2)))
+
+
+def test_states_tell_together_what_each_leaves_open() -> None:
+    """Clamped at both ends, a rope may owe much of its shape in any one state to what the grippers give."""
+    gravity = np.array([0.0, 0.0, -9.81])
+    kept = np.outer(3.0 * np.cos(2 * np.pi * np.linspace(0.0, 1.0, 24)), [1.0, 1.0])
+    states = states_of(kept, 40)
+    each = np.array([s.least.curvature(MATERIAL, gravity) for s in states])
+    np.testing.assert_allclose(common_bend(states[:1]).curvature(MATERIAL, gravity), each[0], atol=1e-9)
+    np.testing.assert_allclose(common_bend(states[:1] * 20).curvature(MATERIAL, gravity), each[0], atol=1e-9)
+    assert rms(each.mean(axis=0) - kept) > 0.2 * rms(kept)
+    assert rms(common_bend(states).curvature(MATERIAL, gravity) - kept) < 0.05 * rms(kept)
+
+
+def test_what_hardly_any_state_tells_is_not_filled_with_their_errors() -> None:
+    """An even bend of a rope that two clamps hold is such: they take it up, however the rope lies."""
+    told = common_bend(states_of(np.tile([0.0, 1.0], (24, 1)), 40, errors=1.0))
+    assert rms(told.curvature(MATERIAL, np.array([0.0, 0.0, -9.81]))) < 0.5
 
 
 def test_a_rope_that_no_gripper_holds_tells_nothing() -> None:
