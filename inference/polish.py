@@ -16,8 +16,8 @@ from .residuals import Offsets, failed, residual
 from .secants import CHANCE, LARGEST, Found, search
 
 #: Least squares starts from another place while it leaves this times what noise leaves, this often at most, from
-#: starts at least so far from places known in some coordinate of the unit cube.
-MISFIT, STARTS, APART = 1.5, 4, 0.1
+#: starts at least so far from places known in some coordinate of the unit cube. A wrong valley may leave little more.
+MISFIT, STARTS, APART = 1.1, 4, 0.1
 #: Evaluations of a search, and from each of these before they are given up.
 EVALUATIONS, FEW_EVALUATIONS = 40, 10
 #: A search ends where it promises less in -2 log likelihood.

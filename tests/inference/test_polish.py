@@ -33,21 +33,31 @@ def test_the_minimum_and_its_covariance() -> None:
 
 
 class TwoValleys(Linear):
-    """A linear problem that looks like another, which nothing fits, where the first parameter is above a half."""
+    """A linear problem that looks like another, which nothing fits, where the first parameter is above a half.
+
+    There ``left`` times what noise leaves is left at least.
+    """
+
+    def __init__(self, left: float) -> None:
+        super().__init__(2.0)
+        outside = np.linalg.svd(self.matrix)[0][:, 2]
+        self.left = np.sqrt(left * 40) * outside
 
     def many(self, units: FloatArray) -> list[FloatArray | None]:
-        wrong = self.matrix @ np.array([0.3, 0.3])
         return [
-            wrong + self.matrix @ (u - np.array([0.8, 0.2])) if u[0] > 0.5 else self.matrix @ (u - np.array([0.4, 0.7]))
+            self.left + self.matrix @ (u - np.array([0.8, 0.2]))
+            if u[0] > 0.5
+            else self.matrix @ (u - np.array([0.4, 0.7]))
             for u in units
         ]
 
 
-def test_another_start_is_tried_where_the_first_leaves_a_misfit() -> None:
+@pytest.mark.parametrize("left", [1.2, 5.0])
+def test_another_start_is_tried_where_the_first_leaves_a_misfit(left: float) -> None:
     starts = np.array([[0.9, 0.3], [0.88, 0.31], [0.2, 0.2], [0.1, 0.9]])
-    stuck = polish(TwoValleys(2.0), starts[0])
-    assert stuck.rss > 1.5 * stuck.count
-    best = polish_from(TwoValleys(2.0), starts)
+    stuck = polish(TwoValleys(left), starts[0])
+    assert stuck.rss == pytest.approx(left * stuck.count, rel=1e-3)
+    best = polish_from(TwoValleys(left), starts)
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
 
 
