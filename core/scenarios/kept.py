@@ -56,7 +56,7 @@ def bent(scenario: Scenario, curvature: FloatArray) -> Body:
     """
     body, start = scenario.body, scenario.start_vertices()
     poses = scenario.motion.at(scenario.times[:1])
-    frame = _frames(scenario, start)[0]
+    frame = untwisted_frames(start[None, :2], poses[:, [0, -1]])[0, 0]  # at the first gripper nothing is twisted yet
     turns = curvature * RopeBending(body, np.concatenate(scenario.grasps)).measures[:, None]
     points = rolled_out(start[0], np.cross(*frame), frame, turns, body.measures)
     return replace(body, vertices=rotate(inverse(poses[0, 0, 3:]), points - poses[0, 0, :3]))
