@@ -59,7 +59,7 @@ class Beside:
             markers: weights ``(M, V)`` of their places on the axis.
         """
         frames = rope_frames(vertices, poses, self.turn, self.natural)
-        across = np.tensordot(markers, frames, axes=(1, 1))  # a matrix product; one einsum of all three takes far longer
+        across = np.tensordot(markers, frames, axes=(1, 1))  # one einsum of all three takes far longer
         return np.asarray(np.einsum("ma,mtax->tmx", self.offsets, across))
 
     def frames(self, points: FloatArray, poses: FloatArray, firsts: IntArray = _ONE) -> FloatArray:
