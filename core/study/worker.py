@@ -152,7 +152,7 @@ def _serve(connection: Connection, file: str) -> None:
     problem: Problem = pickle.loads(Path(file).read_bytes())
     # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_die_with_parent, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_die_with_parent, args=(os.getppid(), file), daemon=True).start()
     # One thread of linear algebra a process: more only get in each other's way, and the order in which
     # they add up would make results depend on the number of workers.
     with threadpool_limits(1):
@@ -162,16 +162,18 @@ def _serve(connection: Connection, file: str) -> None:
             try:
                 task = connection.recv()
             except (EOFError, ConnectionError):  # the parent has gone
-                return
+                break
             outcome = simulate(problem, task)
             try:
                 connection.send(outcome)
             except ConnectionError:
-                return
+                break
+    Path(file).unlink(missing_ok=True)
 
 
-def _die_with_parent(parent: int) -> None:
-    """A parent that is killed outright cannot end its workers; they notice and end themselves."""
+def _die_with_parent(parent: int, file: str) -> None:
+    """A parent that is killed outright can neither end its workers nor take its ``file`` away; they notice and do."""
     while os.getppid() == parent:
         time.sleep(1.0)
+    Path(file).unlink(missing_ok=True)
     os._exit(1)

@@ -112,13 +112,15 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     measurement = small_measurement()
     whole = Study.load(write_study(tmp_path / "whole", measurement), workers=1).fit()
     path = write_study(tmp_path / "killed", measurement)
-    errors = tmp_path / "errors"
+    errors, passing = tmp_path / "errors", tmp_path / "passing"
+    passing.mkdir()
     with errors.open("w") as told:
         process = subprocess.Popen(
             [sys.executable, "-m", "muslin.cli", "fit", str(path), "--workers", "1"],
             stdout=subprocess.DEVNULL,
             stderr=told,
             cwd=tmp_path,
+            env={**os.environ, "TMPDIR": str(passing)},
         )
     status = path.parent / "study.results.zarr/fit/draws/status/c"
     deadline = time.monotonic() + 120
@@ -138,6 +140,9 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     for name, when in done.items():
         assert (status / name).stat().st_mtime_ns == when, f"draw {name} was simulated again"
     assert "Traceback" not in errors.read_text(), "workers end quietly"
+    while left := list(passing.glob("*.problem")):
+        assert time.monotonic() < deadline, f"nobody took {left} away"
+        time.sleep(0.1)
 
 
 def test_results_open_in_xarray_with_units(small_study: Study) -> None:
