@@ -3,8 +3,12 @@
 import re
 
 import numpy as np
-from published import published
+import pytest
+from published import ROOT, published
 from test_datasets import read
+
+from muslin.core.motion import inverse, rotate
+from muslin.core.study import read_config
 
 
 def test_real_cables_have_a_length_that_hardly_changes() -> None:
@@ -33,6 +37,29 @@ def test_real_carried_cloths_lag_as_published() -> None:
         assert take.gripper is not None
         pose = take.gripper.at(take.series.time)[:, 0, :3]
         assert np.nanmedian(np.linalg.norm(np.nanmean(top, axis=1) - pose, axis=1)) < 0.03
+
+
+def test_real_carried_cloths_differ_while_held_still_as_their_study_says() -> None:
+    """Of what hangs still from a hand that is still, a model can tell the mean; what it differs by is no model's."""
+    config = read_config(ROOT / "examples/carried_cloth/study.toml")
+    names = [*config.study.fit_on, *config.study.hold_out]
+    takes, _ = read("carried-cloth", published("cloth_carried"), *names)
+    within, means = [], []
+    for take in takes:
+        assert take.gripper is not None
+        time, poses = take.series.time, take.gripper.at(take.series.time)[:, 0]
+        fine = np.arange(time[0], time[-1], 0.02)
+        speed = np.linalg.norm(np.diff(take.gripper.at(fine)[:, 0, :3], axis=0), axis=1) / 0.02
+        before = [speed[(fine[1:] > t - 1.0) & (fine[1:] <= t)] for t in time]
+        still = [len(b) >= 49 and b.max() < 0.01 for b in before]
+        seen = take.series.points[still]
+        hanging = np.array([rotate(inverse(q[3:]), x - q[:3]) for q, x in zip(poses[still], seen, strict=True)])
+        assert len(hanging) > 10
+        means.append(np.nanmean(hanging, axis=0))
+        within.append(np.nanmean((hanging - means[-1]) ** 2))
+    shapes = np.array(means) - np.mean(means, axis=1, keepdims=True)  # the study takes a constant offset out
+    spread = np.sqrt(np.mean(within) + np.mean(np.var(shapes, axis=0, ddof=1)))
+    assert spread == pytest.approx(config.noise.sd, abs=0.001)
 
 
 def test_real_clouds_are_in_metres_above_the_table() -> None:
