@@ -192,7 +192,7 @@ def cloud(motion: str, sheet: str) -> Case:
 BEAMS = [beam("gravity-b"), beam("load52-a", ", from 52 g", HELD_LOWER)]
 CABLES = [cable(number) for number in (1, 2, 3)]
 SLIDING = [given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES]
-CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth, picture=True)
+CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth)
 IN_AIR = Case("carried cloth, air", DATA / "cloth_carried", carried_in_air, picture=True)
 CASES = [
     *(ball(name) for name in ("whiffle", "tennis", "volleyball", "golf", "bowling")),
