@@ -154,6 +154,9 @@ def _result(
         "effects": list(found.effects),
         "further": list(found.further),
         "rest": _rest(found, joint, work),
+        "together": None
+        if found.together is None
+        else {"effects": list(found.together.names), "explained": e.explained(found.together.both)},
         "candidates": rows,
         "error": {
             "noise": work.fit.noise.sd,

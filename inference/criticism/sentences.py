@@ -76,7 +76,7 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
         return (
             f"The model misses something, but none of the candidates is it: the misfit is {ratio:.1f} times the noise, "
             f"and the best candidate, {best['name']}, explains {100 * best['explained']:.0f} % of the excess: "
-            f"{_reason(best, result)}.{_in_part(best, error['unit'])}"
+            f"{_reason(best, result)}.{_in_part(best, error['unit'])}{_together(result['together'], best)}"
         )
     if verdict == "no-misfit":
         vague = error["noise_error"] > _VAGUE
@@ -108,6 +108,14 @@ def _in_part(best: dict[str, Any], unit: str) -> str:
         f" It is a part of the answer at most: with it the held-out error goes "
         f"{length(best['held_out_before'], unit)} → {length(best['held_out_after'], unit)}."
     )
+
+
+def _together(two: dict[str, Any] | None, best: dict[str, Any]) -> str:
+    """What two effects at once explain, where that is more than the best one does."""
+    if two is None or two["explained"] < best["explained"] + _WORTH_TELLING:
+        return ""
+    pair = " and ".join(two["effects"])
+    return f" Together {pair} explain {100 * two['explained']:.0f} %, which is more, but not enough for a name."
 
 
 def _is_a_part(best: dict[str, Any]) -> bool:

@@ -32,6 +32,7 @@ class Findings:
             ones, an effect that is missing whichever of them it is.
         rest: what was decided with the named ones in the model; None where that was not looked into.
         rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
+        together: the two effects that left least where nothing was named, if any were tried.
     """
 
     verdict: Verdict
@@ -42,6 +43,7 @@ class Findings:
     further: tuple[str, ...] = ()
     rest: Decision | None = None
     rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
+    together: Pair | None = None
 
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
@@ -55,7 +57,7 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     if (verdict == "none" or _outdone(first, pairs)) and (pair := _pair(work, names, first, pairs)):
         return pair
     if verdict == "none":
-        return Findings("none", (), first, first, _nearest(first))
+        return Findings("none", (), first, first, _nearest(first), together=pairs[0] if pairs else None)
     found = Findings(verdict, first.decision.effects, first, first, first.chosen)
     if verdict == "tied":
         return _with_another(work, names, found, pairs) or found

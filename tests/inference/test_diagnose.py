@@ -19,8 +19,8 @@ from muslin.plugins.effects.command import ActuatorLag
 pytest.importorskip("mujoco")
 
 SCHEMA = {
-    "verdict", "effects", "further", "rest", "candidates", "error", "evidence", "numerics", "unrepeatable", "where",
-    "told", "simulations", "budget_spent", "unfinished", "seconds", "seed",
+    "verdict", "effects", "further", "rest", "together", "candidates", "error", "evidence", "numerics", "unrepeatable",
+    "where", "told", "simulations", "budget_spent", "unfinished", "seconds", "seed",
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
+from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _together, _unchecked, _verdict
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -53,6 +53,13 @@ def test_what_to_do_with_a_part_of_the_answer_is_told(explained: float, part: bo
     told = _to_be_sure(study, {"verdict": "none", "candidates": [best]})  # type: ignore[arg-type]
     assert "muslin unknown s.toml" in told
     assert ("muslin add wind s.toml" in told) == part
+
+
+def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
+    two = {"effects": ["drag", "added-mass"], "explained": 0.81}
+    assert "Together drag and added-mass explain 81 %" in _together(two, {"explained": 0.53})
+    assert not _together(two, {"explained": 0.7})
+    assert not _together(None, {"explained": 0.53})
 
 
 def test_held_out_motions_that_show_nothing_are_told() -> None:
