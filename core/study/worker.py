@@ -149,7 +149,10 @@ def _status(code: int | None) -> str:
 
 def _serve(connection: Connection, file: str) -> None:
     """The life of a worker process."""
-    problem: Problem = pickle.loads(Path(file).read_bytes())
+    try:
+        problem: Problem = pickle.loads(Path(file).read_bytes())
+    except FileNotFoundError:  # the parent has gone, and another worker took its file away
+        os._exit(1)
     # Ctrl-C reaches every process of a terminal; the parent alone ends the work, without tracebacks
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_die_with_parent, args=(os.getppid(), file), daemon=True).start()

@@ -22,7 +22,7 @@ from muslin.core.parameters import Parameter
 from muslin.core.rollout import Trajectory
 from muslin.core.scene import Scene
 from muslin.core.study import Failure, SimulationPool, Study, Task
-from muslin.core.study.worker import GRACE
+from muslin.core.study.worker import GRACE, CannotStart, Worker
 from muslin.plugins.effects.air import AirDrag
 
 VALUES = {"stretch_stiffness": 200.0, "bending_rigidity": 3e-5}
@@ -190,6 +190,13 @@ def test_a_worker_that_dies_while_idle_is_replaced(small_study: Study) -> None:
         pool._idle.put(worker)
         (after,) = pool.map([Task(VALUES, "near")])
     assert isinstance(before, Trajectory) and isinstance(after, Trajectory)
+
+
+def test_a_worker_whose_file_was_taken_away_ends_quietly(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As of a command that was killed while its workers were starting: the first of them takes it away."""
+    with pytest.raises(CannotStart, match="one ended with exit status 1"):
+        Worker(str(tmp_path / "gone.problem"))
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
-from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _together, _unchecked, _verdict
+from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -56,10 +56,17 @@ def test_what_to_do_with_a_part_of_the_answer_is_told(explained: float, part: bo
 
 
 def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
-    two = {"effects": ["drag", "added-mass"], "explained": 0.81}
-    assert "Together drag and added-mass explain 81 %" in _together(two, {"explained": 0.53})
-    assert not _together(two, {"explained": 0.7})
-    assert not _together(None, {"explained": 0.53})
+    best = {"name": "lag", "explained": 0.53, "objection": "little", "held_out_before": None, "held_out_after": None}
+    error = {"unit": "m", "noise": 0.003, "before": 0.009, "after": 0.009, "held_out": False, "noise_error": 0.02}
+    none = {"verdict": "none", "effects": [], "error": error, "evidence": {"misfit": 9.0}, "candidates": [best]}
+
+    def told(two: dict[str, Any] | None) -> str:
+        return _verdict(none | {"together": two}, {})
+
+    pair = {"effects": ["drag", "added-mass"], "explained": 0.81}
+    assert "Together drag and added-mass explain 81 %" in told(pair)
+    assert "Together" not in told(pair | {"explained": 0.7})
+    assert "Together" not in told(None)
 
 
 def test_held_out_motions_that_show_nothing_are_told() -> None:
