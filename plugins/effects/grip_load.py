@@ -4,7 +4,6 @@ import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.bending import bending_of
-from ...core.body import Body
 from ...core.material import ClothMaterial, RopeMaterial
 from ...core.scene import Scene
 from .crease import bending_rigidity
@@ -36,9 +35,9 @@ class GripLoad:
         material, body = scene.material, scene.body
         self._rope = isinstance(material, RopeMaterial)
         if isinstance(material, RopeMaterial):
-            self._bending, self._rigidity = bending_of(body), bending_rigidity(material)
+            self._bending, self._rigidity = bending_of(body, scene.held), bending_rigidity(material)
             self._bending.follow(scene.start_positions)
-            self._bends = _stiffest_motions(body, held, self._rigidity)
+            self._bends = _stiffest_motions(scene, held, self._rigidity)
             self._moduli = np.array([[material.stretch_stiffness]])
         else:
             assert isinstance(material, ClothMaterial)
@@ -121,10 +120,10 @@ def _plane_stress(material: ClothMaterial) -> FloatArray:
     )
 
 
-def _stiffest_motions(body: Body, held: IntArray, rigidity: FloatArray) -> FloatArray:
+def _stiffest_motions(scene: Scene, held: IntArray, rigidity: FloatArray) -> FloatArray:
     """Bending stiffness ``(6, 6)`` of a rope against the motions of a grasp, no less than in any direction."""
-    bending = bending_of(body)
-    points = body.vertices[held]
+    body = scene.body
+    bending, points = bending_of(body, scene.held), body.vertices[held]
     rates = []
     for motion in _motions(points - points.mean(axis=0)).transpose(2, 0, 1):
         velocities = np.zeros_like(body.vertices)

@@ -73,6 +73,24 @@ def test_turns_by_compliance_times_the_torque_of_the_weight(name):
     np.testing.assert_allclose(last[held].mean(axis=0), SHEET.vertices[held].mean(axis=0), atol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["mujoco", "pybullet"])
+def test_a_clamp_bears_the_weight_and_the_torque_of_a_stiff_rope_that_sticks_out(name):
+    """All of the bend beside a clamp is that of half a segment, so the load there is what bends that much."""
+    body = rope_line(np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0]]), 16)
+    stiff = RopeMaterial(
+        linear_density=0.02, bending_rigidity=5e-3, twist_rigidity=5e-3, stretch_stiffness=2000.0, damping_time=0.02
+    )
+    masses, weight = stiff.density * body.vertex_measures, G * stiff.density * 0.3
+    sunk = seen(name, body, stiff, [[0, 1]], [GraspCompliance(compliance=0.02)], settle=2.0)[-1]
+    np.testing.assert_allclose(body.vertices[[0, 1], 2] - sunk[[0, 1], 2], 0.02 * weight, rtol=0.02)
+    last = seen(name, body, stiff, [[0, 1]], [GraspCompliance(turn_compliance=0.5)], settle=2.0)[-1]
+    arm = last[1] - last[0]
+    torque = G * masses @ (last[:, 0] - last[:2, 0].mean())
+    assert np.arctan2(-arm[2], arm[0]) == pytest.approx(0.5 * torque, rel=0.02)
+    still = seen(name, body, stiff, [[0, 1]], [GraspSlip(slipperiness=0.5 / weight)], settle=1.0)[-1]
+    np.testing.assert_allclose(still[:2], body.vertices[:2], atol=1e-4)  # it holds twice the weight
+
+
 @pytest.mark.parametrize("name", ["reference", "mujoco", "pybullet"])
 @pytest.mark.parametrize(("body", "material", "held"), [(SHEET, CLOTH, [0, 5]), (ROPE, LINE, [0])])
 def test_slides_at_the_speed_of_what_is_beyond_its_hold(name, body, material, held):
