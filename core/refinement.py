@@ -6,6 +6,9 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .body import Body
+from .clamps import clamped_segments
+from .interpolation import interpolate
+from .kept_bend import KeptBend
 from .scenario import Scenario
 
 
@@ -30,12 +33,28 @@ def refined(scenario: Scenario) -> Scenario | None:
     markers = np.zeros((len(scenario.markers), len(vertices)))
     markers[:, kept] = scenario.markers
     grasps = [np.concatenate([kept[ids], middles[np.isin(edges, ids).all(axis=1)]]) for ids in scenario.grasps]
+    body = replace(old, vertices=vertices, elements=elements, warp=warp, grid=grid)
     return replace(
         scenario,
-        body=replace(old, vertices=vertices, elements=elements, warp=warp, grid=grid),
+        body=body,
         grasps=tuple(grasps),
         markers=markers,
         load_vertices=kept[scenario.load_vertices],
+        kept=None if scenario.kept is None else _halved(scenario.kept, body, np.concatenate(grasps)),
+    )
+
+
+def _halved(bend: KeptBend, body: Body, held: IntArray) -> KeptBend:
+    """The bend at the inner vertices of a rope whose segments were halved; within a clamp there is none."""
+    old = np.arange(1.0, bend.shape.shape[0] + 1)
+    new = 0.5 * np.arange(1, len(body.vertices) - 1)
+    clamped = clamped_segments(body, held)
+    free = np.where(clamped[1:] & clamped[:-1], 0.0, 1.0)[:, None]
+    moments = interpolate(new, old, np.moveaxis(bend.moments, 2, 0))
+    return KeptBend(
+        free * interpolate(new, old, bend.shape),
+        free * interpolate(new, old, bend.rates),
+        free * np.moveaxis(moments, 0, 2),
     )
 
 

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from muslin.core.kept_bend import KeptBend
 from muslin.core.refinement import refined
 from muslin.core.scenario import marker_weights
 from muslin.core.scenarios import preset
+from muslin.core.scenarios.kept import bent
 from muslin.core.scenarios.starts import GivenShape
 
 
@@ -52,3 +54,22 @@ def test_a_rope_with_a_shape_of_its_own_keeps_it() -> None:
     start = fine.start_vertices()
     np.testing.assert_allclose(start[::2], coarse.start_vertices(), atol=1e-12)
     np.testing.assert_allclose(start[1::2], (start[:-1:2] + start[2::2]) / 2, atol=1e-12)
+
+
+def test_a_bend_that_a_rope_keeps_is_the_same_on_the_finer_mesh() -> None:
+    """But for what a mesh makes of it: nothing in the clamps, and as much in all along the rope."""
+    coarse = preset("cable").scenario((0.8,), (21,))
+    places = np.arange(1, 20)
+    shape = np.stack([2.0 + np.sin(places / 5.0), 0.1 * places], axis=1)
+    moments = np.random.default_rng(0).normal(size=(2, 4, 1, 2)) * np.linspace(0.0, 1.0, 19)[:, None]
+    coarse = replace(coarse, kept=KeptBend(shape, 0.1 * shape, moments))
+    fine = refined(coarse)
+    assert fine is not None and fine.kept is not None
+    assert [x.shape for x in (fine.kept.shape, fine.kept.moments)] == [(39, 2), (2, 4, 39, 2)]
+    np.testing.assert_allclose(fine.kept.shape[3:-3:2], shape[1:-1])
+    np.testing.assert_allclose(fine.kept.rates[3:-3:2], 0.1 * shape[1:-1])
+    np.testing.assert_allclose(fine.kept.moments[..., 3:-3:2, :], moments[..., 1:-1, :])
+    bends = [bent(s, s.kept.shape) for s in (coarse, fine) if s.kept is not None]
+    np.testing.assert_allclose(bends[1].vertices[::2], bends[0].vertices, atol=5e-3)
+    straight = np.diff(bends[1].vertices[:3], axis=0)
+    np.testing.assert_allclose(np.cross(*straight), 0.0, atol=1e-12)
