@@ -10,7 +10,7 @@ from ...core.effect import Effect
 from ...core.material import Material
 from ...core.parameters import Parameter
 
-#: A rest shape lies level if it is less high than this share of its size: a recorded gripper never is so exactly [1].
+#: A rest shape lies level if it is less high than this share of its size [1].
 LEVEL_TO = 0.1
 
 
@@ -39,9 +39,9 @@ class Hem(Effect):
 class WetPatch(Effect):
     """Water in the lowest part of the object: where it is wet its density is 1 + uptake times the dry one.
 
-    Wet is what lies below a share of the height of the rest shape, along z; of a rest shape that lies level (to
-    :data:`LEVEL_TO`), along y, and of one that lies along x, along x. Textiles take up 50 to 150 % of their mass.
-    Only the mass of the water counts, not how it softens the yarns or holds the cloth to what it touches
+    Wet is what lies below a share of the height of the rest shape, along z of its own frame; of a rest shape that lies
+    level (to :data:`LEVEL_TO`), along y, and of one that lies along x, along x. Textiles take up 50 to 150 % of their
+    mass. Only the mass of the water counts, not how it softens the yarns or holds the cloth to what it touches
     (:class:`~.adhesion.Adhesion`).
     """
 

@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effect_objects import LYING, ROPE, SHEET, cases, vertices
+from effect_objects import LYING, ROPE, SHEET, cases, engine, vertices
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from muslin.core.body import Body, rope_line
 from muslin.core.material import ClothMaterial, RopeMaterial
+from muslin.core.motion import Motion
+from muslin.core.rollout import rollout
+from muslin.core.scenario import Scenario
 from muslin.plugins.effects.mass import Hem, WetPatch, boundary_edges, share_below
 from muslin.plugins.effects.observation import rotation_matrix
 
@@ -103,3 +106,23 @@ def test_a_hem_and_a_wet_end_pull_a_soft_sheet_longer():
     assert length(more) - length() == pytest.approx(expected, rel=0.1)
     wet = WetPatch(uptake=2.0, extent=0.5)
     assert length(wet) - length() > 0.2 * expected
+
+
+@pytest.mark.parametrize("pitch", [0.15, -0.15])
+def test_water_is_in_the_same_end_however_a_gripper_is_turned_at_first(pitch):
+    """What is wet belongs to the object; its recordings start with grippers turned otherwise."""
+
+    class Noted(WetPatch):
+        def on_loads(self, body, material, loads):
+            seen.append(super().on_loads(body, material, loads))
+            return seen[-1]
+
+    seen = []
+    for angle in (0.0, pitch):
+        pose = np.array([[[0.0, 0.0, 1.0, np.cos(angle / 2), 0.0, np.sin(angle / 2), 0.0]]])
+        scenario = Scenario(
+            "held", ROPE, (np.array([0]),), Motion(np.zeros(1), pose), np.array([0.0, 0.01]), np.eye(11),
+            np.zeros(0, np.int64),
+        )  # fmt: skip
+        rollout(engine("reference"), scenario, RopeMaterial(), [Noted(uptake=1.0, extent=0.3)])
+    np.testing.assert_allclose(seen[1], seen[0])
