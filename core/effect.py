@@ -109,15 +109,33 @@ class Effect(ABC):
         return turn
 
     def on_loads(self, body: Body, material: Material, loads: FloatArray) -> FloatArray:
-        """Extra point mass ``(V,)`` [kg] on the vertices, which weighs too; ``loads`` is what hangs there already."""
+        """Extra point mass ``(V,)`` [kg] on the vertices, which weighs too; ``loads`` is what hangs there already.
+
+        ``body`` is in its rest shape and its own frame, the same in all recordings of the object.
+        """
         return loads
 
     def on_clock(self, times: FloatArray) -> FloatArray:
-        """When the object really was as it was seen at ``times (T,)`` [s]; the earliest is the first of them."""
+        """When the object really was as it was seen at ``times (T,)`` [s].
+
+        One that starts at rest was so before the first of them; one that starts as it was seen starts at what this
+        makes of the first.
+        """
         return times
 
     def on_points(self, points: FloatArray) -> FloatArray:
         """Where ``points (T, M, 3)`` [m] are seen by what measures them."""
+        return points
+
+    def off_points(self, points: FloatArray, first: FloatArray) -> FloatArray:
+        """Where ``points (..., 3)`` [m] really are that are seen there: :meth:`on_points` undone.
+
+        An object that starts as it was seen needs it.
+
+        Args:
+            points: markers or not, of any time.
+            first: all markers as they are seen in the first frame ``(M, 3)`` [m].
+        """
         return points
 
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce | None:

@@ -11,12 +11,13 @@ from .arrays import FloatArray
 from .clamps import clamp_turns
 from .effect import Effect
 from .errors import InputError, RolloutFailed
+from .first_frame import really_starting
 from .interpolation import interpolate
 from .material import Material, RopeMaterial
 from .motion import IDENTITY_POSE, Motion, inverse, rotate, turned
 from .rest_shape import eased
 from .sanity import SanityCheck
-from .scenario import STANDARD_GRAVITY, Scenario
+from .scenario import STANDARD_GRAVITY, Scenario, StartMotion
 from .scenarios.starts import GivenShape
 from .series import PointSeries
 from .simulator import CAPABILITIES, Simulator
@@ -78,10 +79,15 @@ def rollout(
     deadline = np.inf if time_limit is None else started + time_limit
     active = [e for e in effects if not e.is_off]
     gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    told, stamps = scenario.motion, scenario.times
     for effect in active:
         _check_needs(effect, simulator)
         material, gravity = effect.on_material(material), effect.on_gravity(gravity)
         scenario = replace(scenario, motion=effect.on_command(scenario.motion, COMMAND_STEP))
+    seen = reduce(lambda times, effect: effect.on_clock(times), active, stamps)
+    scenario = really_starting(scenario, told, seen, active)
+    start = scenario.times[0]
+    seen = np.maximum(seen, start)  # what starts at rest was so before
     relaxed = reduce(lambda left, effect: effect.relaxed(left), active, material)
     for effect in active:
         scenario = replace(scenario, body=effect.on_body(scenario, relaxed, gravity))
@@ -92,13 +98,11 @@ def rollout(
     if is_askew:  # engines know level obstacles only, so all else is turned until they are
         level = inverse(askew)
         gravity = rotate(level, gravity)
-        earlier = None if scenario.earlier is None else rotate(level, scenario.earlier)
-        motion = Motion(scenario.motion.times, turned(level, scenario.motion.poses))
-        scenario = replace(scenario, motion=motion, earlier=earlier)
+        scenario = _turned(scenario, level)
     scene = scenario.scene(material, gravity, scale)
+    own = scenario.body.scaled(scale, np.zeros(3))
     for effect in active:
-        scene = replace(scene, loads=effect.on_loads(scene.body, material, scene.loads))
-    seen = reduce(lambda times, effect: effect.on_clock(times), active, scenario.times)
+        scene = replace(scene, loads=effect.on_loads(own, material, scene.loads))
     simulator.check(scene)
     world = simulator.open(scene)
     try:
@@ -107,7 +111,7 @@ def rollout(
         factors = [f for f in (e.bind_stiffness(scene) for e in active) if f is not None]
         shifts = [f for f in (e.bind_grasp(scene, world.masses) for e in active) if f is not None]
         settle_steps = int(np.ceil(scenario.settle / dt - 1e-9))
-        start, end = scenario.times[0], max(scenario.times[-1], seen.max())
+        end = max(stamps[-1], seen.max())
         steps = int(np.ceil((end - start) / dt - 1e-9))
         clock = start + dt * np.arange(-settle_steps, steps + 1)
         held = scenario.held_positions(np.maximum(clock, start), scene.start_positions)
@@ -149,16 +153,26 @@ def rollout(
             world.step(target, total, **more)
     finally:
         world.close()
-    vertices = interpolate(np.maximum(seen, start), clock[settle_steps:], path)
-    poses = scenario.motion.at(scenario.times)
+    vertices = interpolate(seen, clock[settle_steps:], path)
+    poses, then = scenario.motion.at(stamps), scenario.motion.at(seen)
     if is_askew:
-        vertices, poses = rotate(askew, vertices), turned(askew, poses)
+        vertices, poses, then = rotate(askew, vertices), turned(askew, poses), turned(askew, then)
     points: FloatArray = scenario.markers @ vertices
     if scenario.beside is not None:
-        points = points + scenario.beside.shifts(vertices, poses, scenario.markers)
+        points = points + scenario.beside.shifts(vertices, then, scenario.markers)
     for effect in active:
         points = effect.on_points(points)
-    return Trajectory(PointSeries(scenario.times, points), vertices, poses, time.monotonic() - started)
+    return Trajectory(PointSeries(stamps, points), vertices, poses, time.monotonic() - started)
+
+
+def _turned(scenario: Scenario, turn: FloatArray) -> Scenario:
+    """The same, turned as a whole about the origin by a quaternion ``(4,)``, but for its obstacles."""
+    earlier = None if scenario.earlier is None else rotate(turn, scenario.earlier)
+    moving = scenario.start_motion
+    if moving is not None:
+        moving = StartMotion(rotate(turn, moving.velocities), rotate(turn, moving.accelerations))
+    motion = Motion(scenario.motion.times, turned(turn, scenario.motion.poses))
+    return replace(scenario, motion=motion, earlier=earlier, start_motion=moving)
 
 
 def _eased(scenario: Scenario, share: float) -> Scenario:

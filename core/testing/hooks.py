@@ -70,6 +70,9 @@ def check_hooks(effect: type[Effect], kind: str) -> None:
     seen[3, 1] = np.nan
     hidden = np.asarray(np.isnan(one.on_points(seen)).any(axis=2))
     must(hidden[3, 1] and hidden.sum() == 1, "on_points must keep a point that is not seen NaN, and no other")
+    first = one.on_points(points[:1])[0]
+    back = _returned("off_points", lambda a: one.off_points(a, first), first)
+    must(np.allclose(back, points[0], atol=1e-9), "off_points does not undo on_points")
 
 
 def check_force(effect: type[Effect], kind: str) -> None:

@@ -12,7 +12,7 @@ from ...core.parameters import Parameter
 class ActuatorLag(Effect):
     """First-order lag of the grippers: tau dy/dt = u - y, starting from rest at the first pose.
 
-    Integrated exactly for a command that is linear between samples of the simulator's time step.
+    Integrated exactly for a command that is linear between samples.
     """
 
     name: ClassVar[str] = "actuator-lag"

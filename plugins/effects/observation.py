@@ -13,8 +13,8 @@ class CameraLatency(Effect):
     """Pictures stamped late: what is said to be seen at t is where the object was at t - latency.
 
     Typical of cameras and motion capture over a network, 10 to 80 ms. Before the first observation the object
-    is taken to have been at rest. Grippers stay on time, which tells it from :class:`~.command.ActuatorLag`
-    only in where the grippers themselves are seen.
+    is taken to have been at rest; one that starts as it was seen in motion starts that much earlier. Grippers stay on
+    time, which tells it from :class:`~.command.ActuatorLag` only in where the grippers themselves are seen.
     """
 
     name: ClassVar[str] = "camera-latency"
@@ -23,7 +23,7 @@ class CameraLatency(Effect):
     symptom: ClassVar[str] = "is seen late by one and the same time throughout, the held part and the free part alike"
 
     def on_clock(self, times: FloatArray) -> FloatArray:
-        return np.asarray(np.maximum(times - self.values["latency"], times[0]))
+        return np.asarray(times - self.values["latency"])
 
 
 class CameraOffset(Effect):
@@ -37,7 +37,13 @@ class CameraOffset(Effect):
     symptom: ClassVar[str] = "is seen displaced by the same distance everywhere and at all times"
 
     def on_points(self, points: FloatArray) -> FloatArray:
-        return np.asarray(points + np.array([self.values[axis] for axis in "xyz"]))
+        return np.asarray(points + self._offset())
+
+    def off_points(self, points: FloatArray, first: FloatArray) -> FloatArray:
+        return np.asarray(points - self._offset())
+
+    def _offset(self) -> FloatArray:
+        return np.array([self.values[axis] for axis in "xyz"])
 
 
 class CameraRotation(Effect):
@@ -57,8 +63,14 @@ class CameraRotation(Effect):
 
     def on_points(self, points: FloatArray) -> FloatArray:
         pivot = points[0].mean(axis=0)
-        turn = rotation_matrix(np.array([self.values[f"about_{axis}"] for axis in "xyz"]))
-        return np.asarray((points - pivot) @ turn.T + pivot)
+        return np.asarray((points - pivot) @ self._turn().T + pivot)
+
+    def off_points(self, points: FloatArray, first: FloatArray) -> FloatArray:
+        pivot = first.mean(axis=0)  # it stays where it is
+        return np.asarray((points - pivot) @ self._turn() + pivot)
+
+    def _turn(self) -> FloatArray:
+        return rotation_matrix(np.array([self.values[f"about_{axis}"] for axis in "xyz"]))
 
 
 def rotation_matrix(vector: FloatArray) -> FloatArray:

@@ -99,6 +99,11 @@ class SeesAll(Drag):
         return np.nan_to_num(points)
 
 
+class SeesAside(Drag):
+    def on_points(self, points: FloatArray) -> FloatArray:
+        return points + 0.01
+
+
 class WrongShape(Drag):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         return lambda time, state: np.zeros(3)
@@ -225,6 +230,7 @@ FAULTS: dict[str, dict[type[Effect], str]] = {
         Lifts: "negative mass",
         BackInTime: "seen earlier",
         SeesAll: "not seen NaN",
+        SeesAside: "off_points does not undo on_points",
     },
     "what it binds is well-formed": {
         WrongShape: "shape",

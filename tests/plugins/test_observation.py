@@ -32,10 +32,9 @@ def test_latency_shows_what_was():
 
 @cases
 @given(st.floats(0.0, 0.1), st.floats(-5.0, 5.0))
-def test_the_clock_never_runs_ahead_or_before_the_start(latency, start):
+def test_the_clock_never_runs_ahead(latency, start):
     seen = CameraLatency(latency=latency).on_clock(TIMES + start)
     assert (seen <= TIMES + start).all()
-    assert seen[0] == start + TIMES[0]
     assert (np.diff(seen) >= 0).all()
 
 
