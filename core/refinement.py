@@ -47,7 +47,7 @@ def refined(scenario: Scenario) -> Scenario | None:
 def _halved(bend: KeptBend, body: Body, held: IntArray) -> KeptBend:
     """The bend at the inner vertices of a rope whose segments were halved; within a clamp there is none."""
     old = np.arange(1.0, bend.shape.shape[0] + 1)
-    new = 0.5 * np.arange(1, len(body.vertices) - 1)
+    new = 0.5 * np.arange(1.0, len(body.vertices) - 1, dtype=np.float64)
     clamped = clamped_segments(body, held)
     free = np.where(clamped[1:] & clamped[:-1], 0.0, 1.0)[:, None]
     moments = interpolate(new, old, np.moveaxis(bend.moments, 2, 0))

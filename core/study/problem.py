@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,11 @@ from ..effect import Effect
 from ..errors import InputError, RolloutFailed
 from ..extractor import KeypointExtractor
 from ..gaps import bridged
-from ..material import UNITS, Material, with_fields
+from ..material import Material, with_fields
 from ..measurement import Measurement, Recording
-from ..parameters import Parameter, ParameterSpace
+from ..parameters import ParameterSpace
 from ..powerless import why_powerless
-from ..registry import REGISTRY, nearest
+from ..registry import REGISTRY
 from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
@@ -28,7 +28,8 @@ from ..scenarios.spacing import told_places
 from ..scenarios.standoffs import told_beside
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
-from .config import ParameterTable, StudyConfig
+from .config import StudyConfig
+from .inferred import effect_values, material_parameters
 from .objects import build_scenario, check_unstretched
 from .windows import cut_up
 
@@ -183,8 +184,8 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     for n, effect in effects.items():
         if kind not in effect.object_kinds:
             raise InputError(f"[effects.{n}] is for {' and '.join(sorted(effect.object_kinds))}, but this is a {kind}")
-    coefficients, fixed = _effect_values(config, effects)
-    space = ParameterSpace((_parameters(config, material) or base.default_priors(kind)) + coefficients)
+    coefficients, fixed = effect_values(config, effects, material)
+    space = ParameterSpace((material_parameters(config, material) or base.default_priors(kind)) + coefficients)
     simulator = _plugin("simulator", config.simulator.name, config.simulator.options)
     for n, effect in effects.items():
         if (reason := why_powerless(effect, simulator, scenarios[fit_on[0]])) is not None:
@@ -244,56 +245,3 @@ def _keep_points(recording: Recording, points: list[int] | None) -> Recording:
             f"[scenario.points]: recording {recording.name!r} has points 0 to {count - 1}, there is no {wrong[0]}"
         )
     return replace(recording, series=replace(series, points=series.points[:, points]))
-
-
-def _parameters(config: StudyConfig, material: Material) -> tuple[Parameter, ...]:
-    out = []
-    for name, table in config.parameters.items():
-        if name not in (*(f.name for f in fields(material)), "scale"):
-            known = [*(f.name for f in fields(material)), "scale"]
-            raise InputError(f"[parameters.{name}]: unknown.{nearest(name, known)} Known: {', '.join(known)}")
-        out.append(_parameter(name, table, UNITS[material.kind][name], f"parameters.{name}"))
-        for bound in (table.low, table.high):
-            _check_bound(material, name, bound)
-    return tuple(out)
-
-
-def _check_bound(material: Material, name: str, bound: float) -> None:
-    """A bound that no material can have is said now, not in the middle of a fit."""
-    if name == "scale":
-        if bound <= 0:
-            raise InputError(f"[parameters.scale]: must be above zero, but a bound is {bound:g}")
-        return
-    try:
-        with_fields(material, {name: bound})
-    except InputError as error:
-        raise InputError(f"[parameters.{name}]: {error}") from error
-
-
-def _parameter(name: str, table: ParameterTable, unit: str, where: str) -> Parameter:
-    if table.unit is not None and table.unit != unit:
-        raise InputError(f"[{where}]: unit is {table.unit!r}, but {name} is in {unit!r}; convert low and high")
-    return Parameter(name, unit, table.low, table.high, table.scale)
-
-
-def _effect_values(
-    config: StudyConfig, effects: dict[str, type[Effect]]
-) -> tuple[tuple[Parameter, ...], dict[str, float]]:
-    inferred: list[Parameter] = []
-    fixed: dict[str, float] = {}
-    for effect, table in config.effects.items():
-        declared = {p.name: p for p in effects[effect].parameters()}
-        given = {f"{effect}.{c}": v for c, v in table.items()}
-        for name in given:
-            if name not in declared:
-                known = [n.split(".", 1)[1] for n in declared]
-                raise InputError(f"[effects.{effect}] has no {name.split('.', 1)[1]!r}; it has {', '.join(known)}")
-        for name, p in declared.items():
-            value = given.get(name)
-            if value is None:
-                inferred.append(p)
-            elif isinstance(value, ParameterTable):
-                inferred.append(_parameter(name, value, p.unit, f"effects.{name}"))
-            else:
-                fixed[name] = float(value)
-    return tuple(inferred), fixed

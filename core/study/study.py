@@ -74,7 +74,7 @@ class Study:
         return SimulationPool(problem or self.problem, self.workers)
 
     def fingerprint(self, step: str = "fit") -> dict[str, Any]:
-        """What the result of a step depends on: study file, meshes and measured numbers. Another one, another result.
+        """What the result of a step depends on: the study file, the files that it names, and what was measured.
 
         A fit depends on held-out recordings only where they are repeats, which tell the noise; compare
         and diagnose on all of them.
@@ -89,10 +89,15 @@ class Study:
         names = {r.name for pair in repeats(problem.recordings.values()) for r in pair} | set(problem.fit_on)
         used = [r for n, r in problem.recordings.items() if n in names or step != "fit"]
         table["measured"] = {r.name: _digest(r) for r in used}
-        for name in self.config.scenario.files:
+        learned = self.config.extractor.options.get("weights")
+        for name in (*self.config.scenario.files, *([learned] if isinstance(learned, str) else [])):
             content = (self.path.parent / name).read_bytes()
-            table.setdefault("meshes", {})[name] = hashlib.sha256(content).hexdigest()
+            table.setdefault("files", {})[name] = hashlib.sha256(content).hexdigest()
         return table
+
+    def _found(self, name: str) -> str:
+        """The absolute path of a file that the study file names."""
+        return str((self.path.parent / name).resolve())
 
     def set_aside(self) -> Path | None:
         """Move results of an earlier state of the study out of the way; nothing that was simulated is lost."""
@@ -196,7 +201,9 @@ class Study:
             config.study.results = f"{path.stem}.results.zarr"
         if path.parent.resolve() != self.path.parent.resolve():
             config.study.measurement = str(self.measurement_path.resolve())
-            config.scenario.move_files(lambda name: str((self.path.parent / name).resolve()))
+            config.scenario.move_files(self._found)
+            if isinstance(learned := config.extractor.options.get("weights"), str):
+                config.extractor = config.extractor.model_copy(update={"weights": self._found(learned)})
         study = Study(config, path, workers=self.workers, progress=self.progress)
         study.problem  # noqa: B018  an effect that cannot act here is refused before anything is written
         study.save()
@@ -204,9 +211,10 @@ class Study:
 
 
 def _digest(recording: Recording) -> str:
-    """A hash of everything that was measured in one recording."""
-    digest = hashlib.sha256(f"{recording.motion} {recording.load!r} {recording.series.correspondence}".encode())
-    digest.update(recording.series.time.tobytes() + recording.series.points.tobytes())
+    """A hash of everything that was measured in one recording, and of what looked at it."""
+    series, camera = recording.series, None if recording.camera is None else recording.camera.as_table()
+    digest = hashlib.sha256(f"{recording.motion} {recording.load!r} {series.correspondence} {camera}".encode())
+    digest.update(series.time.tobytes() + series.points.tobytes())
     if recording.gripper is not None:
         digest.update(recording.gripper.times.tobytes() + recording.gripper.poses.tobytes())
     return digest.hexdigest()

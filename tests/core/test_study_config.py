@@ -105,6 +105,19 @@ def test_effects() -> None:
     )
 
 
+def test_coefficients_that_an_effect_cannot_have() -> None:
+    """Said before anything is simulated; what the effect may be of either sign of stays."""
+    fixed = complaint(effects={"grasp-slip": {"slipperiness": -5.0}})
+    assert "[effects.grasp-slip.slipperiness]: must not be below zero, but is or may be -5 1/N" in fixed
+    prior = complaint(effects={"viscous-damping": {"rate": {"low": -1.0, "high": 2.0}}})
+    assert "[effects.viscous-damping.rate]: must not be below zero" in prior
+    rope = {"scenario": {"name": "hang", "size": [0.4], "vertices": [9]}, "parameters": {}}
+    more = complaint(effects={"rope-hysteresis": {"sliding_share": 1.5, "slip_curvature": 1.0}}, **rope)
+    assert "[effects.rope-hysteresis] with sliding_share = 1.5, slip_curvature = 1: " in more
+    tilted = table(effects={"gravity-tilt": {"about_x": -0.01}})
+    assert build_problem(parse_config(tilted, "s"), measurement()).fixed == {"gravity-tilt.about_x": -0.01}
+
+
 def test_what_the_mesh_does_not_have() -> None:
     assert "takes vertex 99, but the mesh has vertices 0 to 8" in complaint(scenario__grasps=[[0, 99]])
     assert "vertex 44" in complaint(scenario__markers=[0, 1, 2, 3, 4, 5, 6, 7, 44])
