@@ -31,7 +31,8 @@ def read_body(path: Path, scale: float = 1.0, up: str = "z", count: int | None =
 
     A triangle mesh (``.obj``, ``.ply``, ``.stl``, ``.off``, ``.glb``) is cloth, with any holes and seams; its
     vertices keep the order of the file, but those at one place are merged (renderers cut meshes along seams
-    of the texture) and count once, at the first. Many exporters have y up, glTF always. A tetrahedral mesh
+    of the texture) and count once, at the first; triangles are turned to look to the side that the first one of
+    their piece looks to. Many exporters have y up, glTF always. A tetrahedral mesh
     (``.vtk``, ``.vtu``, ``.msh``) is a solid. A ``.csv`` with the columns x, y, z is a rope: a polyline, cut
     anew into segments of equal length.
 
@@ -52,7 +53,8 @@ def read_body(path: Path, scale: float = 1.0, up: str = "z", count: int | None =
     if count is not None and ending in (*SURFACES, *TETRAHEDRA):
         raise InputError(f"{path}: vertices = [{count}] is for ropes; this mesh has vertices of its own")
     if ending in SURFACES:
-        body = Body("cloth", *_surface(path, scale, up))
+        vertices, triangles = _surface(path, scale, up)
+        body = Body("cloth", vertices, _looking_alike(triangles))
     elif ending in TETRAHEDRA:
         body = _solid(path, scale, up)
     elif ending == ".csv":
@@ -109,6 +111,31 @@ def _surface(path: Path, scale: float, up: str) -> tuple[FloatArray, IntArray]:
     vertices, triangles = _merged(turned(vertices, up, str(path)) * scale, triangles)
     _must_be_clean(path, vertices, triangles)
     return vertices, triangles
+
+
+def _looking_alike(triangles: IntArray) -> IntArray:
+    """The same ``(F, 3)``, all of a piece turned to the side of its first one, as bends of a sheet have a sign.
+
+    Of a surface with one side only, as a Moebius strip, some remain the wrong way round where it closes.
+    """
+    sides = triangles[:, [[0, 1], [1, 2], [2, 0]]]
+    beside = dict[tuple[int, int], list[tuple[int, bool]]]()
+    for f, its in enumerate(sides.tolist()):
+        for a, b in its:
+            beside.setdefault((min(a, b), max(a, b)), []).append((f, a < b))
+    turn = np.full(len(triangles), -1)
+    for first in range(len(triangles)):
+        if turn[first] >= 0:
+            continue
+        turn[first], reached = 0, [first]
+        while reached:
+            f = reached.pop()
+            for a, b in sides[f].tolist():
+                for other, upward in beside[min(a, b), max(a, b)]:
+                    if turn[other] < 0:  # two that look alike go along their edge in opposite ways
+                        turn[other] = turn[f] ^ (upward == (a < b))
+                        reached.append(other)
+    return np.where(turn[:, None] == 1, triangles[:, [0, 2, 1]], triangles)
 
 
 def _solid(path: Path, scale: float, up: str) -> Body:

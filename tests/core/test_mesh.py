@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from muslin.core.body import Body, solid_box
+from muslin.core.bending import SheetBending
+from muslin.core.body import Body, cloth_grid, solid_box
 from muslin.core.errors import BrokenPluginError, InputError, MissingFileError
 from muslin.core.importing import mesh as reading
 from muslin.core.importing.mesh import read_body, read_closed_surface
@@ -42,6 +43,28 @@ def test_vertices_that_are_cut_along_a_seam_are_one(tmp_path: Path) -> None:
     assert body.elements.tolist() == [[0, 1, 2], [0, 2, 3]]
     same = read_body(obj(tmp_path, SQUARE.replace("1 2 3", "1/1 2/2 3/3").replace("1 3 4", "1/5 3/3 4/4") + texture))
     assert same.elements.tolist() == body.elements.tolist()
+
+
+def test_triangles_of_a_piece_are_turned_to_look_to_one_side(tmp_path: Path) -> None:
+    """The bend of a sheet has a sign, and exporters do not always agree on which."""
+    sheet = cloth_grid(0.3, 0.3, 6, 6)
+    mixed = sheet.elements.copy()
+    turned = np.random.default_rng(0).random(len(mixed)) < 0.5
+    turned[0] = False
+    mixed[turned] = mixed[turned][:, [0, 2, 1]]
+    text = "\n".join(f"v {x} {y} {z}" for x, y, z in sheet.vertices) + "\n"
+    body = read_body(obj(tmp_path, text + "\n".join(f"f {a + 1} {b + 1} {c + 1}" for a, b, c in mixed)))
+    p = body.vertices[body.elements]
+    normals = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    assert (normals @ normals[0] > 0).all()
+    np.testing.assert_array_equal(np.sort(body.elements, axis=1), np.sort(mixed, axis=1))
+    x, _, z = sheet.vertices.T
+    rolled = 0.1 * np.stack([np.sin(10 * x), 1 - np.cos(10 * x), 10 * z], axis=1)
+    bends = [SheetBending(one) for one in (sheet, body)]
+    for one in bends:
+        one.follow(rolled)
+    assert np.abs(bends[0].curvature).max() > 9.0
+    np.testing.assert_allclose(bends[1].curvature, bends[0].curvature, atol=1e-9)
 
 
 @pytest.mark.parametrize("ending", ["stl", "ply", "off", "glb"])
