@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .arrays import FloatArray
 from .errors import InputError, MissingFileError
-from .motion import IDENTITY_POSE, inverse, rotate
+from .motion import IDENTITY_POSE, inverse, quaternion_of, rotate
 from .store import write_text
 
 #: Horizontal field of view where none is asked for [rad].
@@ -231,18 +231,3 @@ def _towards(ahead: FloatArray) -> FloatArray:
     x = np.cross(z, up)
     x /= np.linalg.norm(x)
     return quaternion_of(np.stack([x, np.cross(z, x), z], axis=1))
-
-
-def quaternion_of(m: FloatArray) -> FloatArray:
-    """The unit quaternion w x y z of a rotation matrix ``(3, 3)``, with w not below zero."""
-    # Bar-Itzhack (2000): the quaternion is the eigenvector of the largest eigenvalue of this symmetric matrix
-    k = np.array(
-        [
-            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
-            [0.0, m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
-            [0.0, 0.0, m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
-            [0.0, 0.0, 0.0, m[2, 2] - m[0, 0] - m[1, 1]],
-        ]
-    )
-    quaternion = np.linalg.eigh(k, UPLO="U")[1][:, -1]
-    return np.asarray(quaternion * np.where(quaternion[0] < 0, -1.0, 1.0))

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import FloatArray
-from .camera import Camera, quaternion_of
+from .camera import Camera
 from .chessboard import Corners
 from .errors import InputError
 from .lens import Lens
+from .motion import quaternion_of
 from .optional import library
 
 #: Fewer pictures leave the focal length open.

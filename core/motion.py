@@ -65,6 +65,21 @@ def turns_about(axes: FloatArray, quaternions: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
+def quaternion_of(m: FloatArray) -> FloatArray:
+    """The unit quaternion w x y z of a rotation matrix ``(3, 3)``, with w not below zero."""
+    # Bar-Itzhack (2000): the quaternion is the eigenvector of the largest eigenvalue of this symmetric matrix
+    k = np.array(
+        [
+            [m[0, 0] + m[1, 1] + m[2, 2], m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]],
+            [0.0, m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0]],
+            [0.0, 0.0, m[1, 1] - m[0, 0] - m[2, 2], m[1, 2] + m[2, 1]],
+            [0.0, 0.0, 0.0, m[2, 2] - m[0, 0] - m[1, 1]],
+        ]
+    )
+    quaternion = np.linalg.eigh(k, UPLO="U")[1][:, -1]
+    return np.asarray(quaternion * np.where(quaternion[0] < 0, -1.0, 1.0))
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """Poses of G grippers at K times, held before the first and after the last.

@@ -29,20 +29,6 @@ def frame(body: Body) -> FloatArray:
     return np.eye(3) if np.abs(turn - np.eye(3)).max() < 1e-12 else np.asarray(turn)
 
 
-def quaternion(turn: FloatArray) -> FloatArray:
-    """The rotation matrix ``turn (3, 3)`` as w x y z: the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
-    t = turn
-    form = np.array(
-        [
-            [t[0, 0] + t[1, 1] + t[2, 2], 0.0, 0.0, 0.0],
-            [t[2, 1] - t[1, 2], t[0, 0] - t[1, 1] - t[2, 2], 0.0, 0.0],
-            [t[0, 2] - t[2, 0], t[0, 1] + t[1, 0], t[1, 1] - t[0, 0] - t[2, 2], 0.0],
-            [t[1, 0] - t[0, 1], t[0, 2] + t[2, 0], t[1, 2] + t[2, 1], t[2, 2] - t[0, 0] - t[1, 1]],
-        ]
-    )
-    return np.asarray(np.linalg.eigh(form)[1][:, -1])
-
-
 def cell_of_elements(body: Body, cells: tuple[int, int, int]) -> IntArray:
     """The quadratic cell ``(E,)`` in which every tetrahedron of a regular box lies, last axis fastest."""
     local = (body.vertices - body.vertices[0]) @ frame(body)

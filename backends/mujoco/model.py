@@ -12,11 +12,12 @@ from ...core.arrays import FloatArray, IntArray
 from ...core.body import Body
 from ...core.clamps import clamped_segments
 from ...core.material import ClothMaterial, RopeMaterial, SolidMaterial
+from ...core.motion import quaternion_of
 from ...core.obstacles import StaticMesh
 from ...core.plate import bending_matrix, is_flat, rest_folds, rest_stress
 from ...core.scene import Scene
 from . import rod, shell
-from .box import cell_of_elements, frame, quadratic_cells, quaternion
+from .box import cell_of_elements, frame, quadratic_cells
 from .engine import engine
 from .obstacles import geoms
 from .soft_bending import is_soft
@@ -160,7 +161,7 @@ def mjcf(scene: Scene, time_step: float, sets: IntArray) -> str:
   </asset>
   <worldbody>
     {fixed}
-    <body name="frame" quat="{_numbers(quaternion(turn))}">
+    <body name="frame" quat="{_numbers(quaternion_of(turn))}">
     <flexcomp name="body" type="direct" dim="{body.elements.shape[1] - 1}"{parts}
         mass="{mass:.17g}" radius="{radius:.17g}" point="{points}" element="{elements}">
       <contact selfcollide="none" contype="2" conaffinity="1"/>
