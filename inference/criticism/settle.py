@@ -36,9 +36,9 @@ def settled(work: Work, stage: Stage) -> Stage:
     best, plain = evidence.nearest, stage.plain
     if best.rss < stage.evidence.nearest.rss:  # a better start must not pass for an effect
         again = work.polished(stage.effects, best.fit.unit[: best.base], MORE_EVALUATIONS)
-        if again.rss < plain.rss:
-            plain = again
-            evidence = work.evidence(stage.effects, plain, evidence.candidates)
+        plain = min(plain, again, key=lambda p: p.rss)
+    # what held-out motions say of a candidate, they say of it as it is now, beside the model without it
+    evidence = work.evidence(stage.effects, plain, evidence.candidates)
     return replace(stage, plain=plain, evidence=evidence, decision=decide(evidence))
 
 
@@ -56,7 +56,7 @@ def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
             there = work.roughly_polished(effects, unit, FEW_EVALUATIONS, None)
             if c.rss - there.rss > MARGIN:  # more than the same place again
                 c = replace(c, fit=work.polished(effects, there.unit, MORE_EVALUATIONS))
-    return work.judged(c)
+    return c
 
 
 def _passing(evidence: Evidence) -> list[Candidate]:

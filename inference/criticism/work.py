@@ -179,7 +179,7 @@ class Work:
 
         Args:
             candidate: fitted.
-            plain: the model without it on the held-out recordings, where it is to be compared with that.
+            plain: the model without it on the held-out recordings; left out, these count as ones that would show it.
         """
         held = self.held_out(candidate.space, candidate.fit.unit)
         parts = self.objective(()).parts(candidate.fit.white)

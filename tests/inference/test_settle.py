@@ -17,10 +17,13 @@ from muslin.inference.polish import Polished
 
 
 class Bench:
-    """Stands in for rollouts: from other parameters a fit comes down to ``floors`` [noise variances]."""
+    """Stands in for rollouts: from other parameters a fit comes down to ``floors`` [noise variances].
 
-    def __init__(self, floors: dict[str, float], budget: bool = True) -> None:
-        self.floors, self.budget, self.asked = floors, budget, list[str]()
+    Held-out motions move by ``shift`` [noise variances] with any effect.
+    """
+
+    def __init__(self, floors: dict[str, float], budget: bool = True, shift: float = np.inf) -> None:
+        self.floors, self.budget, self.shift, self.asked = floors, budget, shift, list[str]()
         self.study = SimpleNamespace(config=SimpleNamespace(study=SimpleNamespace(seed=1)))
 
     def may_go_on(self) -> bool:
@@ -40,11 +43,8 @@ class Bench:
     def objective(self, effects: tuple[str, ...]) -> SimpleNamespace:
         return SimpleNamespace(many=lambda points: [np.ones(3) for _ in points])
 
-    def judged(self, c: Candidate) -> Candidate:
-        return c
-
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
-        return evidence(plain.rss, *candidates)
+        return evidence(plain.rss, *(replace(c, held_out_shift=self.shift) for c in candidates))
 
 
 def stage(*candidates: Candidate) -> Stage:
@@ -66,6 +66,15 @@ def test_rivals_are_left_alone_where_the_leader_leaves_noise() -> None:
     after = settled(bench, stage(candidate("drag", 1.5 * COUNT), candidate("lag", 1.6 * COUNT)))  # type: ignore[arg-type]
     assert after.decision.effects == ("drag",) and "lag" not in bench.asked
     assert after.chosen.rss == pytest.approx(COUNT)
+
+
+def test_held_out_motions_that_are_too_gentle_stay_so_once_it_is_fitted_further() -> None:
+    """Nothing there gets better by it, nor would it if it were missing."""
+    gentle = replace(candidate("drag", 1.5 * COUNT, held_out=0.010), held_out_shift=2.0)
+    after = settled(Bench({"drag": COUNT, "plain": 9 * COUNT}, shift=2.0), stage(gentle))  # type: ignore[arg-type]
+    assert after.decision == Decision("named", ("drag",)) and not after.chosen.shown_held_out
+    strong = settled(Bench({"drag": COUNT, "plain": 9 * COUNT}, shift=20.0), stage(gentle))  # type: ignore[arg-type]
+    assert strong.decision.verdict == "none"
 
 
 def test_a_better_start_does_not_pass_for_an_effect() -> None:
