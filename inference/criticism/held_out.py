@@ -18,7 +18,8 @@ class HeldOut:
 
     Args:
         errors: root mean square by recording [unit]; infinite where one cannot be simulated.
-        white: residuals of all of them ``(N,)``, whitened by noise and numerics; None where one has none.
+        white: residuals of all of them ``(N,)``, whitened by noise and numerics, their squares adding up as fewer,
+            independent ones would; None where one has none.
         information: independent numbers that one residual is worth.
         dropped: how many residuals do not count.
     """
@@ -45,7 +46,7 @@ class HeldOut:
         """
         if self.white is None or other.white is None:
             return float("inf")
-        return self.information * float(np.sum((self.white - other.white) ** 2))
+        return float(np.sum((self.white - other.white) ** 2))
 
 
 def held_out_residuals(

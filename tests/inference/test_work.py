@@ -5,6 +5,7 @@ from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from test_verdict import candidate
 
 from muslin.core.measurement import Recording
@@ -55,18 +56,20 @@ def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
     np.testing.assert_array_equal(Work.as_a_user_fits(work, found), beside.unit)  # type: ignore[arg-type]
 
 
-def test_evidence_says_whether_held_out_motions_would_show_a_candidate() -> None:
-    pool = Pool()
+@pytest.mark.parametrize("ar1", [0.0, 0.5])
+def test_evidence_says_whether_held_out_motions_would_show_a_candidate(ar1: float) -> None:
+    pool, noise = Pool(), replace(NOISE, ar1=ar1)
     work = SimpleNamespace(
         pool=pool, problem=SimpleNamespace(fit_on=("r",), hold_out=("r",), recordings=pool.problem.recordings),
-        fit=SimpleNamespace(noise=NOISE), offsets=Offsets(), discrepancy=Discrepancy(), _held_out={},
-        space=lambda effects: SPACE, objective=lambda effects: Objective(pool, SPACE, ("r",), NOISE, Offsets()),
+        fit=SimpleNamespace(noise=noise), offsets=Offsets(), discrepancy=Discrepancy(), _held_out={},
+        space=lambda effects: SPACE, objective=lambda effects: Objective(pool, SPACE, ("r",), noise, Offsets()),
     )  # fmt: skip
     work.held_out, work.judged = partial(Work.held_out, work), partial(Work.judged, work)
     plain = polish(work.objective(()), np.array([0.8]), 8)
     moved = [0.001, 0.3]  # of the wave's height
     candidates = [Candidate("drag", SPACE, 0, replace(plain, unit=plain.unit + m)) for m in moved]
     found = Work.evidence(work, (), plain, candidates).candidates  # type: ignore[arg-type]
-    expected = [float(np.sum((m * WAVE) ** 2)) / NOISE.sd**2 for m in moved]
+    worth = (1 - ar1) / (1 + ar1)  # of a number of an AR(1) sequence, for its mean
+    expected = [worth * float(np.sum((m * WAVE) ** 2)) / noise.sd**2 for m in moved]
     np.testing.assert_allclose([c.held_out_shift for c in found], expected, rtol=1e-6)
     assert [c.shown_held_out for c in found] == [False, True]
