@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from ...core.effect import Effect
 from ...core.study import Study
 from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable
@@ -47,8 +49,7 @@ def explain(result: dict[str, Any]) -> list[str]:
 
 def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
     error, verdict, named = result["error"], result["verdict"], result["effects"]
-    where = "held-out error" if error["held_out"] else "error on the fitted recordings"
-    fall = f"{where} {length(error['before'], error['unit'])} → {length(error['after'], error['unit'])}"
+    fall = _fall(error)
     noise = f"noise {length(error['noise'], error['unit'])}"
     ratio = result["evidence"]["misfit"] ** 0.5
     rows = {c["name"]: c for c in result["candidates"]}
@@ -100,10 +101,19 @@ def _verdict(result: dict[str, Any], effects: dict[str, type[Effect]]) -> str:
     )
 
 
+def _fall(error: dict[str, Any]) -> str:
+    where = "held-out error" if error["held_out"] else "error on the fitted recordings"
+    if np.isnan(error["before"]):
+        return f"{where} not known (one of the two models cannot be simulated there)"
+    return f"{where} {length(error['before'], error['unit'])} → {length(error['after'], error['unit'])}"
+
+
 def _in_part(best: dict[str, Any], unit: str) -> str:
     """What a candidate is good for that is not the answer, where motions that it was not fitted to get better by it."""
     if not _is_a_part(best):
         return ""
+    if np.isinf(best["held_out_before"]):
+        return " It is a part of the answer at most: with it held-out motions can be simulated, and without it not."
     return (
         f" It is a part of the answer at most: with it the held-out error goes "
         f"{length(best['held_out_before'], unit)} → {length(best['held_out_after'], unit)}."

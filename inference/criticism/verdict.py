@@ -87,12 +87,15 @@ class Evidence:
     def better_held_out(self, candidate: Candidate) -> bool:
         """The excess error on motions it was not fitted to falls; true if there are none to ask.
 
-        Where the plain model has no excess there to speak of, it must not rise. Motions that do not show the
-        effect, as strong as it was found, say nothing of it.
+        Where the plain model has no excess there to speak of, it must not rise; where it cannot be simulated, it is
+        enough that it can be with the effect. Motions that do not show the effect, as strong as it was found, say
+        nothing of it.
         """
         if np.isnan(self.held_out_white) or not candidate.shown_held_out:
             return True
         before, after = self.held_out_white, candidate.held_out_white
+        if np.isinf(before):
+            return bool(np.isfinite(after))
         if before - 1.0 < HELD_OUT_SLACK:
             return bool(after < before + HELD_OUT_SLACK)
         return bool(after < before - HELD_OUT_SHARE * (before - 1.0))

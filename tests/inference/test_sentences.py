@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from muslin.inference.criticism.caveats import elsewhere, numerics, rest
@@ -43,6 +44,18 @@ def test_a_candidate_that_is_a_part_of_the_answer_is_told_with_what_it_is_good_f
     assert "8.3 mm → 6.5 mm" in _in_part(part, "m")
     for less in ({"explained": 0.1}, {"held_out_after": 0.0084}, {"held_out_before": None, "held_out_after": None}):
         assert not _in_part(part | less, "m")
+    told = _in_part(part | {"held_out_before": np.inf}, "m")
+    assert "with it held-out motions can be simulated, and without it not" in told and "inf" not in told
+
+
+def test_an_error_that_nobody_knows_is_told_as_such() -> None:
+    """A take that only one of two models can be simulated on has no error before and after."""
+    row = {"name": "drag", "coefficients": {"rate": {"mean": 1.0, "sd": 0.1, "unit": "1/s"}}}
+    error = {"unit": "m", "noise": 0.003, "held_out": True, "before": np.nan, "after": np.nan, "noise_error": 0.02}
+    evidence = {"misfit": 9.0, "misfit_after": 1.0, "explained": 1.0}
+    named = {"verdict": "named", "effects": ["drag"], "error": error, "evidence": evidence, "candidates": [row]}
+    told = _verdict(named, {"drag": SimpleNamespace(symptom="moves too fast")})  # type: ignore[dict-item]
+    assert "held-out error not known (one of the two models cannot be simulated there), noise 3.0 mm" in told
 
 
 @pytest.mark.parametrize("explained, part", [(0.36, True), (0.1, False)])

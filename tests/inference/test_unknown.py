@@ -10,6 +10,7 @@ from unknown_study import Hidden, fitted_study
 
 from muslin.core.body import cloth_grid, rope_line
 from muslin.core.errors import InputError, MissingFileError
+from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.core.registry import REGISTRY
 from muslin.core.rollout import rollout
 from muslin.core.study import Study
@@ -17,8 +18,12 @@ from muslin.core.testing.reference import ReferenceSimulator
 from muslin.core.testing.samples import sample_material, sample_scenario
 from muslin.inference.criticism.unknown import unknown as step
 from muslin.inference.criticism.unknown.basis import make_basis, mesh_modes
+from muslin.inference.criticism.unknown.decision import Case, decide
 from muslin.inference.criticism.unknown.field import field_effect
 from muslin.inference.criticism.unknown.law_file import add_law, law_effect, read_law
+from muslin.inference.criticism.unknown.refit import RefittedLaw
+from muslin.inference.criticism.unknown.result import law_table, law_text
+from muslin.inference.polish import Polished
 from muslin.plugins.effects.law import Law
 
 SHEET = cloth_grid(0.3, 0.3, 7, 7)
@@ -138,6 +143,38 @@ def test_no_law_is_made_up_for_a_force_of_no_simple_kind(tmp_path: Path, monkeyp
     check_json(result)
     assert (result["verdict"], result["law"]) == ("none", None)
     assert result["force"]["explained"] > 0.3
+
+
+def refitted(rss: float, **held_out: float) -> RefittedLaw:
+    """A law that leaves so much [noise variances] of 300 numbers, and these errors on held-out recordings [m]."""
+    space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter("law.linear_drag", "1/s", 0, 10)))
+    fit = Polished(np.array([0.5, 0.3]), np.full(300, np.sqrt(rss / 300)), np.zeros((300, 2)), np.eye(2) * 1e-4, 300.0)
+    return RefittedLaw("drag", space, 1, fit, held_out)
+
+
+def test_of_what_cannot_be_simulated_without_a_law_no_shares_are_told() -> None:
+    case = Case(9 * 300.0, 300.0, {"other": np.inf}, 0.003, 0.01)
+    law, torn = refitted(300.0, other=0.010), refitted(300.0, other=np.inf)
+    assert case.explained_held_out(law) is None and case.holds_up(law) and not case.holds_up(torn)
+    decision = decide(replace(case, laws=(law,)))
+    assert decision.verdict == "law"
+    told = law_table(case, law)
+    force = {
+        "recordings": {"near": {"over_weight": 0.1, "root_mean_square": 1e-3, "worst_time": 0.1}},
+        "explained": 1.0,
+    }
+    error = {"held_out_before": np.inf, "held_out_after": 0.010, "noise": 0.003, "unit": "m"}
+    text = " ".join(law_text({"verdict": "law", "law": told, "force": force, "error": error, "alternatives": []}))
+    assert "cannot all be simulated without it; with it their error is 10.00 mm" in text
+    assert "on held-out ones" not in text and "inf" not in text
+
+
+def test_what_can_be_simulated_without_a_law_tells_what_it_explains() -> None:
+    case = Case(9 * 300.0, 300.0, {"other": np.inf, "third": 0.010}, 0.003, 0.01)
+    assert case.explained_held_out(refitted(300.0, other=0.5, third=0.010)) == 0.0
+    assert not case.holds_up(refitted(300.0, other=0.004, third=0.010))
+    assert case.holds_up(refitted(300.0, other=0.004, third=0.004))
+    assert not case.holds_up(refitted(300.0, other=np.inf, third=0.004))
 
 
 def law_file(folder: Path, **terms: object) -> Path:

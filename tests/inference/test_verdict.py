@@ -111,6 +111,13 @@ def test_held_out_motions_that_would_not_show_an_effect_do_not_speak_against_it(
     assert decide(evidence(9 * COUNT, unseen, held_out=0.0031)) == Decision("named", ("drag",))
 
 
+def test_an_effect_without_which_held_out_motions_cannot_be_simulated_may_be_named() -> None:
+    e = evidence(9 * COUNT, candidate("drag", 1.02 * COUNT), held_out=np.inf)
+    assert decide(e) == Decision("named", ("drag",))
+    torn = candidate("drag", 1.02 * COUNT, held_out=np.inf)
+    assert objection(evidence(9 * COUNT, torn, held_out=np.inf), torn) == "held-out"
+
+
 def test_what_two_models_differ_by_on_held_out_motions() -> None:
     rng = np.random.default_rng(0)
     a = rng.normal(size=400)

@@ -21,7 +21,7 @@ class Case:
     Args:
         rss_plain: residual sum of squares of the model as it is, on fitted recordings [noise variances].
         count: degrees of freedom.
-        held_out_plain: root mean square error on each held-out recording [unit].
+        held_out_plain: root mean square error on each held-out recording [unit]; infinite where it cannot be simulated.
         noise_sd: [unit].
         noise_error: relative standard error of ``noise_sd``.
         unsure: what else may be left or not, as the model cannot be repeated [noise variances].
@@ -50,14 +50,18 @@ class Case:
         return float(np.clip((self.rss_plain - law.rss) / max(self.rss_plain - floor, 2 * MARGIN), 0.0, 1.0))
 
     def explained_held_out(self, law: RefittedLaw) -> float | None:
-        """The same on held-out recordings, of the variance; negative if a law does harm; None without any excess."""
-        if not self.held_out_plain:
+        """The same on held-out recordings, of the variance; negative if a law does harm; None without any excess.
+
+        It is of those that can be simulated without the law: of an error that nobody knows there are no shares.
+        """
+        told = [name for name, error in self.held_out_plain.items() if np.isfinite(error)]
+        if not told:
             return None
-        before, after = (float(np.mean(np.square(list(h.values())))) for h in (self.held_out_plain, law.held_out))
+        before, after = (float(np.mean([h[n] ** 2 for n in told])) for h in (self.held_out_plain, law.held_out))
         excess = before - self.noise_sd**2
         if not excess > HELD_OUT_EXCESS * self.noise_sd**2:
             return None
-        return float(min(1.0, (before - after) / excess)) if np.isfinite(after) else -float("inf")
+        return float(min(1.0, (before - after) / excess))
 
     def penalised(self, law: RefittedLaw) -> float:
         """The Bayesian information criterion, its noise scaled to what the best law leaves."""
@@ -70,7 +74,12 @@ class Case:
         return drop_z(drop, len(law.terms), self.tried) >= SIGNIFICANT
 
     def holds_up(self, law: RefittedLaw) -> bool:
-        """A law must explain what is held out; where nothing is to be explained, it must do no harm."""
+        """A law must explain what is held out; where nothing is to be explained, it must do no harm.
+
+        With it every held-out recording can be simulated, which is all that is asked of one that cannot without it.
+        """
+        if not np.isfinite(list(law.held_out.values())).all():
+            return False
         share = self.explained_held_out(law)
         if share is not None:
             return share >= HELD_OUT_SHARE

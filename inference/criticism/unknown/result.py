@@ -128,10 +128,14 @@ def law_text(result: dict[str, Any]) -> tuple[str, ...]:
     error = result["error"]
     if error["held_out_after"] is not None:
         scale, unit = (1e3, "mm") if error["unit"] == "m" else (1.0, error["unit"])
-        lines.append(
-            f"Held-out error {scale * error['held_out_before']:.2f} -> {scale * error['held_out_after']:.2f} {unit}, "
-            f"noise {scale * error['noise']:.2f} {unit}."
-        )
+        before, after, noise = (scale * error[k] for k in ("held_out_before", "held_out_after", "noise"))
+        told = f"Held-out error {before:.2f} -> {after:.2f} {unit}, noise {noise:.2f} {unit}."
+        if np.isinf(before):
+            told = (
+                "Held-out recordings cannot all be simulated without it; with it their error is "
+                f"{after:.2f} {unit}, noise {noise:.2f} {unit}."
+            )
+        lines.append(told)
         if error["held_out_after"] > _NOISE_ONLY * error["noise"]:
             lines.append(
                 "What it leaves there is more than noise: it predicts, but take its terms as a description, not as the "
