@@ -54,6 +54,9 @@ def verdict(found: Findings) -> Verdict:
     e = errors(found)
     numbers = f"{length(e['before'], e['unit'])} on the {e['on']} recordings, noise {length(e['noise'], e['unit'])}"
     detail = (str(found.compare.get("text") or "").splitlines() or [""])[-1]  # a table comes before it
+    if found.compare.get("adequate") and found.compare.get("elsewhere"):
+        fitted = "The fitted model explains the recordings that it was fitted to, but not all that were held out"
+        return Verdict("adequate where fitted", "open", f"{fitted}: error {numbers}.", detail)
     if found.compare.get("adequate"):
         return Verdict("adequate", "good", f"The fitted model explains the recordings: error {numbers}.", detail)
     return Verdict(
@@ -104,7 +107,10 @@ def _diagnosed(found: Findings) -> Verdict:
     }.get(str(result["verdict"]), f"Verdict: {result['verdict']}.")
     if result.get("unfinished"):
         text = f"The error is {before} at {floor}; the budget ended before what promises most was refitted."
-    tone = {"none": "bad", "no-misfit": "good"}.get(str(result["verdict"]), "open")
+    elsewhere = result["verdict"] == "no-misfit" and (result.get("told") or {}).get("elsewhere")
+    if elsewhere:
+        text = f"Nothing is seen to be missing where it was fitted, but the {e['on']} error is {before}, {floor}."
+    tone = {"none": "bad", "no-misfit": "open" if elsewhere else "good"}.get(str(result["verdict"]), "open")
     return Verdict(words(str(result["verdict"])), tone, text, detail)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 #: What to do where the numbers of the model count.
 _FINER = {"step": "lower [simulator] time_step", "mesh": "raise [scenario] vertices"}
 #: A held-out error of so many times the noise is told where the fitted recordings show no misfit.
-_ELSEWHERE = 1.5
+ELSEWHERE = 1.5
 
 
 def further(result: dict[str, Any]) -> str:
@@ -52,7 +52,7 @@ def elsewhere(result: dict[str, Any]) -> str:
     if result["verdict"] not in ("no-misfit", "cannot-tell") or result["unfinished"] or not error["held_out"]:
         return ""
     ratio = result["evidence"]["held_out"] ** 0.5
-    if np.isnan(ratio) or ratio < _ELSEWHERE:
+    if np.isnan(ratio) or ratio < ELSEWHERE:
         return ""
     if np.isinf(ratio):
         return "But held-out motions cannot be simulated with what was fitted, so nothing is said of them."

@@ -1,11 +1,14 @@
 """What the first sentences of a report say of a verdict."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from made_up_study import make_study
 from report_page import page_of
 
+from muslin.cli.report.gather import gather
+from muslin.cli.report.verdict import verdict
 from muslin.cli.report.words import NBSP, fall
 
 
@@ -64,3 +67,14 @@ def test_an_after_study_that_has_less_than_was_found_is_not_told_as_all_of_it(tm
 )
 def test_an_error_that_falls_by_little_is_told_to_a_tenth(before: float, after: float, said: str) -> None:
     assert fall(before, after).replace(NBSP, " ") == said
+
+
+@pytest.mark.parametrize("caveat", ["", "But held-out recordings are far off (2 of 2)."])
+def test_a_model_that_only_fits_where_it_was_fitted_is_not_told_as_good(tmp_path: Path, caveat: str) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose", drag=True, verdict="no-misfit")
+    results = study.results("r+")
+    results["compare"].attrs["elsewhere"] = caveat
+    results["diagnose"].attrs["result"] = {**results["diagnose"].attrs["result"], "told": {"elsewhere": caveat}}  # type: ignore[dict-item]
+    said = [verdict(replace(gather(study), diagnose=None)), verdict(gather(study))]
+    assert [v.tone for v in said] == ["open" if caveat else "good"] * 2
+    assert ["but" in v.headline for v in said] == [bool(caveat)] * 2

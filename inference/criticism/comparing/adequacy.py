@@ -61,7 +61,10 @@ class Adequacy:
         least = self.p_value <= 1 / (self.replicates + 1) + 1e-12
         p = f"p < {1 / self.replicates:.2g}" if least else f"p = {self.p_value:.2g}"
         if self.adequate:
-            return f"The model is adequate: the misfit is no larger than the noise explains ({p})."
+            return (
+                "The model is adequate on the recordings that it was fitted to: the misfit is no larger than the noise "
+                f"explains ({p})."
+            )
         return f"The model is not adequate ({p}); what gives it away most: {self.signs[0].name}."
 
 

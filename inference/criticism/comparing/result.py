@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ..caveats import ELSEWHERE
 from .adequacy import Adequacy
 from .excess import Group
 
@@ -71,6 +72,24 @@ class Comparison:
         """The p value is not significant."""
         return self.adequacy.adequate
 
+    @property
+    def elsewhere(self) -> str:
+        """That held-out recordings are far off, which the test of the fitted ones does not see; "" where they are not.
+
+        Of a model that is not adequate anyway nothing more is said.
+        """
+        held = {r.recording for r in self.rows if r.role == "held-out"}
+        times = {g.name: g.rmse / g.expected for g in self.groups if g.partition == "recording" and g.name in held}
+        off = [name for name, ratio in times.items() if ratio > ELSEWHERE]
+        if not self.adequate or not off:
+            return ""
+        worst = max(off, key=times.__getitem__)
+        return (
+            f"But held-out recordings are far off ({len(off)} of {len(held)}; most {worst}, {times[worst]:.1f} times "
+            "what noise gives): fit on one of them too ([study] fit_on), and compare again; if it is not adequate "
+            "then, muslin diagnose asks what it lacks."
+        )
+
     def text(self) -> str:
         """A table and a few sentences for people."""
         unit, factor = ("mm", 1e3) if self.rows[0].unit == "m" else (self.rows[0].unit, 1.0)
@@ -84,7 +103,8 @@ class Comparison:
                 for v, w in ((r.rmse, 8), (r.noise, 8), (r.scatter, 8), (r.baseline, 9), (r.default, 9))
             )
             lines.append(f"{r.recording:<{wide}} {r.role:<9}{cells}  {r.worst_time:.2f} s, point {r.worst_point}")
-        return "\n".join([*lines, *(s for s in (self.where, self.sets, self.adequacy.text()) if s)])
+        verdict = " ".join(s for s in (self.adequacy.text(), self.elsewhere) if s)
+        return "\n".join([*lines, *(s for s in (self.where, self.sets, verdict) if s)])
 
     def to_json(self) -> dict[str, Any]:
         """Everything that was found, as plain values; lengths in the unit of the recordings."""
@@ -94,6 +114,7 @@ class Comparison:
             "replicates": self.adequacy.replicates,
             "limit": self.adequacy.limit,
             "signs": [asdict(s) for s in self.adequacy.signs],
+            "elsewhere": self.elsewhere,
             "where": self.where,
             "sets": self.sets,
             "groups": [asdict(g) for g in self.groups],
