@@ -198,7 +198,19 @@ def test_the_excess_is_placed_where_it_was_put() -> None:
 def test_no_excess_is_placed_where_there_is_none() -> None:
     takes, _, _ = fitted(measured(np.random.default_rng(4)), white_noise(), NONE, TRUTH)
     groups = excess(takes, partitions(takes), white_noise(), np.random.default_rng(0))
-    assert all(g.share is None for g in groups) and "Nowhere" in sentence(groups, 1)
+    assert all(g.share is None for g in groups) and "no larger than the noise may make it" in sentence(groups, 1)
+
+
+def test_of_a_misfit_in_one_place_only_the_whole_is_told_as_noise() -> None:
+    """One corner of sixteen is off by half more than the noise, which is little in all."""
+    rng = np.random.default_rng(0)
+    points = measured(rng)
+    points[:, -1] += 1.4 * SD * rng.normal(size=points[:, -1].shape)
+    takes, jacobian, unit = fitted(points, white_noise(), NONE, TRUTH)
+    tested = adequacy(takes, partitions(takes), jacobian, unit, white_noise(), NONE, rng)
+    assert "not adequate" in tested.text() and "free corners" in tested.text()
+    told = sentence(excess(takes, partitions(takes), white_noise(), rng), 1)
+    assert told == "As a whole the error is no larger than the noise may make it."
 
 
 def unordered(points: np.ndarray, seed: int = 0) -> np.ndarray:

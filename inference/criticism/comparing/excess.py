@@ -71,7 +71,7 @@ def excess(
 def sentence(groups: Sequence[Group], recordings: int) -> str:
     """Where the excess is, in one sentence."""
     if all(g.share is None for g in groups):
-        return "Nowhere is the error larger than the noise makes it."
+        return "As a whole the error is no larger than the noise may make it."
     told: list[str] = []
     for partition in ("recording", "phase", "contact", "distance", "place"):
         of = [g for g in groups if g.partition == partition and g.share is not None]
