@@ -121,9 +121,12 @@ def recording_rows(found: Findings) -> list[Table]:
 def candidate_rows(found: Findings) -> list[Table]:
     """One candidate effect a row, best first."""
     e = errors(found)
-    named = set((found.diagnose or {}).get("effects") or [])
+    d = found.diagnose or {}
+    named = set(d.get("effects") or [])
+    seen = {*named, *(d.get("further") or [])}  # as strong as they are here
     rows = []
     for c in found.candidates:
+        blind = unseen(c)
         rows.append(
             {
                 "name": words(str(c["name"])),
@@ -133,8 +136,8 @@ def candidate_rows(found: Findings) -> list[Table]:
                 "width": round(100 * min(max(number(c.get("explained")) or 0.0, 0.0), 1.0), 1),
                 "z": _z(c.get("z")),
                 "after": length(c.get("held_out_after"), e["unit"]),
-                "identifiability": identifiability(c),
-                "unseen": unseen(c),
+                "identifiability": "only if as strong as here" if blind and c["name"] in seen else identifiability(c),
+                "unseen": blind and c["name"] not in seen,
             }
         )
     return rows

@@ -87,8 +87,9 @@ def unrepeatable(result: dict[str, Any]) -> str:
 
 
 def invisible(result: dict[str, Any]) -> str:
-    """The candidates of which these data say nothing."""
-    hidden = sorted(c["name"] for c in result["candidates"] if c["identifiability"] == 0.0)
+    """The candidates of which these data say nothing; what is told of was strong enough to be seen."""
+    told = (*result["effects"], *result["further"])
+    hidden = sorted(c["name"] for c in result["candidates"] if c["identifiability"] == 0.0 and c["name"] not in told)
     return f"Not visible in these data, so neither ruled in nor out: {', '.join(hidden)}." if hidden else ""
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_up_study import make_study
@@ -44,6 +45,17 @@ def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
     text = page_of(study).text
     assert "Whichever it is, wind is missing, too. With air drag and wind, the" in text
     assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
+
+
+def test_what_is_missing_is_not_told_as_not_to_be_seen(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    group = study.results("r+")["diagnose"]
+    result: dict[str, Any] = group.attrs["result"]  # type: ignore[assignment]
+    rows = [{**row, "identifiability": 0.0} for row in result["candidates"]]
+    group.attrs["result"] = {**result, "further": ["viscous-damping"], "candidates": rows}
+    text = page_of(study).text
+    assert "neither found nor ruled out: gravity tilt, actuator lag" in text
+    assert text.count("only if as strong as here") == 2 and text.count("no: too weak") == 2
 
 
 @pytest.mark.parametrize("verdict", ["named", "tied"])

@@ -1,6 +1,7 @@
 """The next experiment, on a rope that is simulated in milliseconds: what is proposed separates what was tied."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -171,6 +172,20 @@ def test_nothing_open_is_said_without_a_simulation(tmp_path: Path) -> None:
     found = propose(study)
     assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0
     assert found.text().startswith("Nothing is open: linear-drag is named")
+
+
+def test_an_effect_that_is_named_is_not_one_that_could_not_be_seen(tmp_path: Path) -> None:
+    """Where an ordinary strength would not show, a large one may."""
+    study = rope_study(tmp_path)
+    unseen = {"name": "linear-drag", "coefficients": {}, "identifiability": 0.0}
+    for hidden, effects in (([], ()), (["quadratic-drag"], ("quadratic-drag",))):
+        put_diagnosis(study, "named", ["linear-drag"], hidden=hidden, models=[kept(study, "linear-drag", 1.0, 5.0)])
+        group = study.results("r+")["diagnose"]
+        result: dict[str, Any] = group.attrs["result"]  # type: ignore[assignment]
+        rows = [unseen, *result["candidates"][1:]]
+        group.attrs["result"] = {**result, "candidates": rows}
+        assert opening.opening_of(study).effects == effects
+        assert propose(study, simulations=30).result["purpose"] == ("unseen" if hidden else "nothing")
 
 
 def test_what_was_not_seen_is_shown_by_a_livelier_motion(tmp_path: Path) -> None:

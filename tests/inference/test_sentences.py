@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from muslin.inference.criticism.caveats import elsewhere, numerics, rest
+from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest
 from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
 
@@ -80,6 +80,16 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
     assert "Together drag and added-mass explain 81 %" in told(pair)
     assert "Together" not in told(pair | {"explained": 0.7})
     assert "Together" not in told(None)
+
+
+def test_what_is_told_of_is_not_told_as_invisible() -> None:
+    """An ordinary strength of an effect may not show where a large one does."""
+    rows = [
+        {"name": n, "identifiability": seen} for n, seen in (("wind", 0.0), ("drag", 0.0), ("lag", 0.0), ("hem", 1))
+    ]
+    told = invisible({"effects": ["wind"], "further": ["lag"], "candidates": rows})
+    assert told == "Not visible in these data, so neither ruled in nor out: drag."
+    assert not invisible({"effects": ["wind", "drag"], "further": ["lag"], "candidates": rows})
 
 
 def test_held_out_motions_that_show_nothing_are_told() -> None:

@@ -69,7 +69,7 @@ def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
         return Opening("tied", named, further, undecided=True, **kept)
     if further:
         return Opening("tied", further, named, undecided=True, **kept)
-    hidden = [r["name"] for r in rows if not r.get("visible", r["identifiability"] > 0)]
+    hidden = [r["name"] for r in rows if r["identifiability"] == 0.0 and r["name"] not in named]
     if hidden:
         return Opening("unseen", tuple(hidden), named, **kept)
     told = " and ".join(named)
