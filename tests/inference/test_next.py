@@ -1,6 +1,7 @@
 """The next experiment, on a rope that is simulated in milliseconds: what is proposed separates what was tied."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -171,7 +172,7 @@ def test_nothing_open_is_said_without_a_simulation(tmp_path: Path) -> None:
     put_diagnosis(study, "named", ["linear-drag"])
     found = propose(study)
     assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0
-    assert found.text().startswith("Nothing is open: linear-drag is named")
+    assert found.text().startswith("No motion is proposed: linear-drag is named")
 
 
 def test_an_effect_that_is_named_is_not_one_that_could_not_be_seen(tmp_path: Path) -> None:
@@ -186,6 +187,33 @@ def test_an_effect_that_is_named_is_not_one_that_could_not_be_seen(tmp_path: Pat
         group.attrs["result"] = {**result, "candidates": rows}
         assert opening.opening_of(study).effects == effects
         assert propose(study, simulations=30).result["purpose"] == ("unseen" if hidden else "nothing")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "more", "said"),
+    [
+        ("none", {}, "none of the candidates, and these data show every one of them; muslin unknown {}"),
+        ("cannot-tell", {"unfinished": True}, "before what promises most was refitted; allow several times"),
+        ("no-misfit", {}, "no effects are tied, and these data show every candidate"),
+    ],
+)
+def test_what_tells_more_than_a_motion_is_said(tmp_path: Path, verdict: str, more: dict[str, bool], said: str) -> None:
+    study = rope_study(tmp_path)
+    put_diagnosis(study, verdict, [], hidden=["quadratic-drag"] if more else [])
+    group = study.results("r+")["diagnose"]
+    rows = [{"name": "linear-drag", "coefficients": {}, "identifiability": 0.5}]
+    result: dict[str, Any] = group.attrs["result"]  # type: ignore[assignment]
+    group.attrs["result"] = {**result, "candidates": [*result["candidates"], *rows], **more}
+    found = propose(study)
+    assert found.result["purpose"] == "nothing" and found.result["simulations"] == 0
+    assert found.text().startswith("No motion is proposed: ") and said.format(study.path) in found.text()
+
+
+def test_no_force_in_space_is_looked_for_in_pixels() -> None:
+    take = SimpleNamespace(series=SimpleNamespace(unit="px"))
+    study = SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": take}))
+    told = opening._no_question(study, {"verdict": "none", "effects": []})  # type: ignore[arg-type]
+    assert "of points in metres muslin unknown estimates" in told and "s.toml" not in told
 
 
 def test_what_was_not_seen_is_shown_by_a_livelier_motion(tmp_path: Path) -> None:

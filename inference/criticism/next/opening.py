@@ -25,7 +25,7 @@ class Opening:
         models: what the diagnosis kept of its models.
         means: coefficients that the diagnosis found, ``effect.coefficient`` [units].
         candidates: effects that it tried.
-        reason: why nothing is open.
+        reason: why no motion is asked for.
         undecided: the diagnosis compared them, and does not go by what they differ by on the recordings.
     """
 
@@ -70,15 +70,28 @@ def opening_of(study: Study, asked: Sequence[str] = ()) -> Opening:
     if further:
         return Opening("tied", further, named, undecided=True, **kept)
     hidden = [r["name"] for r in rows if r["identifiability"] == 0.0 and r["name"] not in named]
-    if hidden:
+    if hidden and not result.get("unfinished"):
         return Opening("unseen", tuple(hidden), named, **kept)
-    told = " and ".join(named)
-    reason = (
-        f"{told} is named, and no other candidate would have been hidden"
-        if told
-        else ("no effects are tied, and these data show every candidate")
-    )
-    return Opening("nothing", reason=reason, **kept)
+    return Opening("nothing", reason=_no_question(study, result), **kept)
+
+
+def _no_question(study: Study, result: Mapping[str, Any]) -> str:
+    """Why a motion would tell no more, and what would."""
+    named = result["effects"]
+    if named:
+        told = f"{' and '.join(named)} {'is' if len(named) == 1 else 'are'} named"
+        return f"{told}, and no other candidate would have been hidden"
+    if result.get("unfinished"):
+        return (
+            "the diagnosis ended before what promises most was refitted; allow several times as many simulations "
+            "([diagnose] simulations), and diagnose again"
+        )
+    if result["verdict"] != "none":
+        return "no effects are tied, and these data show every candidate"
+    what = "something is missing that is none of the candidates, and these data show every one of them"
+    if study.problem.recordings[study.problem.fit_on[0]].series.unit == "px":
+        return f"{what}; of points in metres muslin unknown estimates the missing force itself"
+    return f"{what}; muslin unknown {study.path} estimates the missing force itself"
 
 
 def tied_rivals(

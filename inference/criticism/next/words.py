@@ -17,7 +17,7 @@ def explain(result: dict[str, Any], limits: str) -> list[str]:
     """
     names, purpose = result["effects"], result["purpose"]
     if purpose == "nothing":
-        return [f"Nothing is open: {result['reason']}. No further motion is proposed."]
+        return [f"No motion is proposed: {result['reason']}."]
     what = "Tied now" if purpose == "tied" else "Not visible in these data"
     beside = f", with {' and '.join(result['beside'])} in the model" if result["beside"] else ""
     out = [f"{what}: {', '.join(names)}{beside}."]
