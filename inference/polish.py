@@ -38,6 +38,11 @@ class Polished(Found):
     covariance: FloatArray
     count: float
 
+    @property
+    def widened(self) -> FloatArray:
+        """The covariance ``(D, D)`` to be told: what is left beyond noise makes the best fit that much less certain."""
+        return np.asarray(self.covariance * max(1.0, self.rss / self.count))
+
 
 class Objective:
     """White residuals of all given recordings as a function of a point in the unit cube.

@@ -66,7 +66,7 @@ class Candidate:
         """The same for any effect in the model."""
         low = np.array([p.low for p in self.space])
         span = np.array([p.high for p in self.space]) - low
-        sd = np.sqrt(np.diag(self.fit.covariance)) * np.sqrt(max(1.0, self.rss / self.fit.count))
+        sd = np.sqrt(np.diag(self.fit.widened))
         return {
             p.name.split(".", 1)[1]: (float(low[k] + span[k] * self.fit.unit[k]), float(span[k] * sd[k]), p.unit)
             for k, p in enumerate(self.space)
@@ -78,8 +78,7 @@ class Candidate:
         """Squared distance of the coefficients from zero, in units of their joint uncertainty."""
         zero = np.array([(0.0 - p.low) / (p.high - p.low) for p in list(self.space)[self.base :]])
         away = self.fit.unit[self.base :] - zero
-        covariance = self.fit.covariance[self.base :, self.base :] * max(1.0, self.rss / self.fit.count)
-        return float(away @ np.linalg.solve(covariance, away))
+        return float(away @ np.linalg.solve(self.fit.widened[self.base :, self.base :], away))
 
     @property
     def visible(self) -> bool:

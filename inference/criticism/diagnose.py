@@ -93,7 +93,7 @@ def _models(found: Findings) -> list[dict[str, Any]]:
             "values": c.space.as_dict(c.space.from_unit(c.fit.unit)),
             "parameters": list(c.space.names),
             "unit": c.fit.unit.tolist(),
-            "covariance": c.fit.covariance.tolist(),
+            "covariance": c.fit.widened.tolist(),
             "rss": c.rss,
         }
         for names, c in each

@@ -82,9 +82,7 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
             best, step, found = _polished(study, pool, store, noise, takes, upto)
         simulations = upto * len(takes.simulated) + pool.count - before
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
-    # what the model leaves unexplained makes the estimate that much less certain
-    inflation = np.sqrt(max(1.0, best.rss / best.count))
-    held = at_bounds(samples, best.unit, inflation * np.sqrt(np.diag(best.covariance)))
+    held = at_bounds(samples, best.unit, np.sqrt(np.diag(best.widened)))
     warnings = [
         *bound_notes(space, held),
         *failure_notes(space, *store.tried(upto), store.failures(), samples),
@@ -101,7 +99,7 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
         "derivative_step": step,
         "at_bound": [n for i, n in enumerate(space.names) if any(a.index == i for a in held)],
     }
-    sd = physical_sd(space, best.unit, best.covariance) * inflation
+    sd = physical_sd(space, best.unit, best.widened)
     with storage_errors(study.results_path):
         save_result(store.group, study, posterior, samples, learner.log_weights, best, sd, noise, about)
     return load_fit(study)

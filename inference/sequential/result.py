@@ -134,7 +134,7 @@ def save_result(
     put(group, "estimate", space.from_unit(best.unit), ["parameter"])
     put(group, "estimate_sd", sd, ["parameter"])
     put(group, "estimate_unit", best.unit, ["parameter"], "unit cube")
-    put(group, "estimate_covariance", best.covariance, ["parameter", "parameter_2"], "unit cube")
+    put(group, "estimate_covariance", best.widened, ["parameter", "parameter_2"], "unit cube")
     group.attrs.update(
         {
             "parameters": list(space.names),

@@ -3,15 +3,17 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small import small_measurement, write_study
+from test_verdict import COUNT, candidate, evidence
 
 from muslin.core.errors import InputError
 from muslin.core.study import Study
 from muslin.inference.criticism import work
-from muslin.inference.criticism.diagnose import Diagnosis
+from muslin.inference.criticism.diagnose import Diagnosis, _models
 from muslin.inference.polish import Objective, Polished
 from muslin.plugins.effects.air import AirDrag
 from muslin.plugins.effects.command import ActuatorLag
@@ -127,6 +129,18 @@ def test_the_same_study_runs_on_the_other_engine_by_changing_one_word(tmp_path: 
     row = study.compare().rows[0]
     assert np.isfinite(row.rmse)
     assert row.rmse < row.baseline
+
+
+def test_models_are_kept_as_vague_as_they_are_told() -> None:
+    """Three times the noise is left of one of them."""
+    left = [candidate("drag", COUNT), candidate("lag", 9.0 * COUNT)]
+    found = SimpleNamespace(
+        first=SimpleNamespace(evidence=evidence(20.0 * COUNT, *left)), effects=("drag",), rivals=(), verdict="named"
+    )
+    for kept, c in zip(_models(found), left, strict=True):  # type: ignore[arg-type]
+        ((_, sd, _),) = c.coefficients.values()
+        assert kept["covariance"][1][1] == pytest.approx(sd**2)
+        np.testing.assert_allclose(kept["covariance"], c.fit.covariance * c.rss / COUNT)
 
 
 def test_candidates_are_the_installed_effects_that_are_not_in_yet(small_study: Study) -> None:

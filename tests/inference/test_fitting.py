@@ -69,13 +69,15 @@ def test_a_fit_tells_what_is_known_past_chance(small_study: Study, monkeypatch: 
     told = list[Polished]()
 
     def past_chance(objective: Objective, best: Polished) -> Polished:
-        told.append(replace(best, covariance=4.0 * best.covariance))  # as if chance had a hand in it
+        # as if chance had a hand in it, and three times the noise were left
+        told.append(replace(best, covariance=4.0 * best.covariance, count=best.rss / 9.0))
         return told[-1]
 
     monkeypatch.setattr(fitting, "seen_past_chance", past_chance)
-    small_study.fit()
+    sd = small_study.fit().sd
     kept = read(small_study.step_results("fit"), "estimate_covariance")
-    np.testing.assert_allclose(kept, told[-1].covariance)
+    np.testing.assert_allclose(kept, 9.0 * told[-1].covariance)
+    np.testing.assert_allclose(sd, fitting.physical_sd(small_study.problem.space, told[-1].unit, kept))
 
 
 def test_a_finished_fit_is_returned_and_not_run_again(small_study: Study) -> None:

@@ -124,9 +124,7 @@ def refitted_rival(
     points = np.stack([np.concatenate([plain, s]) for s in starts])
     sizes = [np.inf if w is None else float(w @ w) for w in objective.many(points)]
     fit = polish(objective, points[int(np.argmin(sizes))], EVALUATIONS)
-    # what the model leaves unexplained makes its parameters that much less certain
-    covariance = fit.covariance * max(1.0, fit.rss / fit.count)
-    return Rival(effects[0], space, fit.unit, covariance, fit.rss)
+    return Rival(effects[0], space, fit.unit, fit.widened, fit.rss)
 
 
 def leads_of(rivals: Sequence[Rival]) -> FloatArray:

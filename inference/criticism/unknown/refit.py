@@ -55,10 +55,10 @@ class RefittedLaw:
 
     @property
     def terms(self) -> dict[str, tuple[float, float, str]]:
-        """Mean, standard deviation and unit of every coefficient; misfit that is left makes it less certain."""
+        """Mean, standard deviation and unit of every coefficient."""
         own = list(self.space)[self.base :]
         mean = self.space.from_unit(self.fit.unit)[self.base :]
-        sd = np.sqrt(np.diag(self.fit.covariance)[self.base :] * max(1.0, self.rss / self.fit.count))
+        sd = np.sqrt(np.diag(self.fit.widened)[self.base :])
         return {
             p.name.removeprefix(f"{LAW}."): (float(m), float(s * (p.high - p.low)), p.unit)
             for p, m, s in zip(own, mean, sd, strict=True)
