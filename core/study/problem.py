@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from ..simulator import Simulator
 from .config import StudyConfig
 from .inferred import effect_values, material_parameters
 from .objects import build_scenario, check_unstretched
-from .windows import cut_up
+from .windows import cut_all
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Problem:
         fixed: values of effect coefficients that are not inferred.
         effects: classes of every effect that a value may name.
         time_limit: on the computation of one rollout [s]; None for none.
-        pieces: into how many a recording that is fitted was cut, in the mean.
+        cut_from: by piece the recording that it is of, where recordings that are fitted are cut.
     """
 
     recordings: dict[str, Recording]
@@ -62,7 +62,12 @@ class Problem:
     fixed: dict[str, float]
     effects: dict[str, type[Effect]]
     time_limit: float | None = None
-    pieces: float = 1.0
+    cut_from: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def pieces(self) -> float:
+        """Into how many a recording that is fitted was cut, in the mean."""
+        return len(self.cut_from) / len(set(self.cut_from.values())) if self.cut_from else 1.0
 
     def simulate(self, values: Mapping[str, float], recording: str) -> Trajectory:
         """One rollout; ``values`` names material fields, ``scale``, and ``effect.coefficient``.
@@ -137,14 +142,10 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if not fit_on:
         raise InputError("[study.fit_on]: nothing is left to fit on, every recording is held out")
     held, fitted = [measurement[n] for n in hold_out], [measurement[n] for n in fit_on]
-    cuts, whole = 1.0, dict[str, Recording]()
-    if (length := config.study.window) is not None:
-        pieces = [(piece, r) for r in fitted for piece in cut_up(r, length)]
-        fitted, whole = [piece for piece, _ in pieces], {piece.name: r for piece, r in pieces}
-        cuts, fit_on = len(fitted) / len(fit_on), tuple(r.name for r in fitted)
-    used = {r.name: r for r in (*fitted, *held)}
+    fitted, whole = cut_all(fitted, config.study.window)
+    fit_on = tuple(r.name for r in fitted)
     base = preset(config.scenario.name)
-    recordings = {n: _keep_points(r, config.scenario.points) for n, r in used.items()}
+    recordings = {r.name: _keep_points(r, config.scenario.points) for r in (*fitted, *held)}
     options = dict(config.extractor.options)
     if isinstance(options.get("weights"), str):
         options["weights"] = str(folder / options["weights"])
@@ -199,9 +200,9 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     for name, scenario in scenarios.items():
         for scale in sorted(scales):
             _check_start(simulator, scenario, material, scale, name)
-    limit = config.study.time_limit
+    limit, cut_from = config.study.time_limit, {n: r.name for n, r in whole.items()}
     return Problem(
-        recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects, limit, cuts
+        recordings, fit_on, hold_out, scenarios, simulator, extractor, material, space, fixed, effects, limit, cut_from
     )
 
 

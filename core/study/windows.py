@@ -1,5 +1,6 @@
 """Recordings in pieces that start as measured one after the other: multiple shooting."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..measurement import Recording
+from ..scenario import Scenario
 
 #: A piece has so many frames at least.
 _FEWEST = 10
@@ -49,3 +51,26 @@ def cut_up(recording: Recording, length: float) -> list[Recording]:
         )
         for a, b in parts
     ]
+
+
+def cut_all(recordings: Sequence[Recording], length: float | None) -> tuple[list[Recording], dict[str, Recording]]:
+    """Pieces of all, and by piece the recording that it is of; without a length the same recordings, and none."""
+    if length is None:
+        return list(recordings), {}
+    pieces = [(piece, r) for r in recordings for piece in cut_up(r, length)]
+    return [piece for piece, _ in pieces], {piece.name: r for piece, r in pieces}
+
+
+def joined(scenarios: Mapping[str, Scenario], cut_from: Mapping[str, str]) -> dict[str, Scenario]:
+    """By recording, from where its first piece starts to where its last one ends: what was moved in one go.
+
+    Args:
+        scenarios: of recordings and pieces, those of a recording in order.
+        cut_from: by piece the recording that it is of.
+    """
+    out: dict[str, Scenario] = {}
+    for name, scenario in scenarios.items():
+        whole = cut_from.get(name, name)
+        before = [out[whole].times] if whole in out else []
+        out[whole] = replace(out.get(whole, scenario), times=np.concatenate([*before, scenario.times]))
+    return out

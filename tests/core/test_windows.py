@@ -1,5 +1,7 @@
 """Recordings in pieces that start as measured."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,9 +10,10 @@ from hypothesis import strategies as st
 from muslin.core.errors import InputError
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
+from muslin.core.scenarios import preset
 from muslin.core.series import PointSeries
 from muslin.core.study.config import parse_config
-from muslin.core.study.windows import cut_up
+from muslin.core.study.windows import cut_all, cut_up, joined
 
 
 def take(frames: int) -> Recording:
@@ -65,3 +68,17 @@ def test_only_what_starts_as_measured_is_cut() -> None:
         parse_config(table, "study.toml")
     table["scenario"]["start"] = "measured"  # type: ignore[index]
     assert parse_config(table, "study.toml").study.window == 1.0
+
+
+def test_pieces_of_a_recording_become_one_again() -> None:
+    whole, other = take(100), replace(take(60), name="other")
+    hidden = replace(whole.series, points=np.where(np.arange(100)[:, None, None] < 7, np.nan, whole.series.points))
+    pieces, of = cut_all([replace(whole, series=hidden), other], 0.5)
+    base = preset("cable").scenario()
+    scenarios = {r.name: base.for_recording(r) for r in (*pieces, whole)}
+    found = joined(scenarios, {name: f"{r.name}, cut" for name, r in of.items()})
+    assert list(found) == ["swing, cut", "other, cut", "swing"]
+    np.testing.assert_array_equal(found["swing, cut"].times, whole.series.time[7:])  # nothing is fitted before
+    np.testing.assert_array_equal(found["swing"].times, whole.series.time)
+    assert all(s.motion is whole.gripper or s.motion is other.gripper for s in found.values())
+    assert cut_all([whole, other], None) == ([whole, other], {})

@@ -13,6 +13,7 @@ from muslin.core.errors import RolloutFailed
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
+from muslin.core.motion import Motion
 from muslin.core.parameters import Parameter
 from muslin.core.registry import REGISTRY
 from muslin.core.rollout import rollout
@@ -21,6 +22,7 @@ from muslin.core.scene import Scene
 from muslin.core.simulator import State, World
 from muslin.core.store import put
 from muslin.core.study import Study, parse_config, write_config
+from muslin.core.study.windows import cut_all
 from muslin.core.testing.reference import ReferenceSimulator
 
 NOISE = 0.008
@@ -91,12 +93,17 @@ def register(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(REGISTRY._objects, ("simulator", simulator.name), simulator)
 
 
-def rope_study(folder: Path, *effects: Effect, simulator: str = "reference", noise: float = NOISE) -> Study:
-    """A rope moved gently once, with a fit that is what a fit would find without any effects."""
-    motion = smooth_path([(0, 0, 0, 1), (0.5, 0.03, 0, 1), (1.0, 0, 0, 1)])
-    scenario = replace(
-        preset("swing").scenario(size=[0.4], vertices=[5]), motion=motion, times=np.arange(0, 1.0, 1 / 25), settle=0.0
-    )
+#: To and fro, gently; up and down again.
+GENTLE = smooth_path([(0, 0, 0, 1), (0.5, 0.03, 0, 1), (1.0, 0, 0, 1)])
+LIFT = smooth_path([(0, 0, 0, 1), (1.0, 0, 0, 1.4), (2.0, 0, 0, 1)])
+
+
+def rope_study(
+    folder: Path, *effects: Effect, simulator: str = "reference", noise: float = NOISE, motion: Motion = GENTLE
+) -> Study:
+    """A rope moved once, with a fit that is what a fit would find without any effects."""
+    times = np.arange(0, motion.times[-1], 1 / 25)
+    scenario = replace(preset("swing").scenario(size=[0.4], vertices=[5]), motion=motion, times=times, settle=0.0)
     truth = RopeMaterial(stretch_stiffness=STIFFNESS, linear_density=0.05)
     series = rollout(ReferenceSimulator(0.02), scenario, truth, effects).series
     noisy = series.points + np.random.default_rng(0).normal(0, noise, series.points.shape)
@@ -115,9 +122,25 @@ def rope_study(folder: Path, *effects: Effect, simulator: str = "reference", noi
     return study
 
 
+def cut_in_half(study: Study, noise: float = NOISE) -> None:
+    """What is fitted in two pieces, as where a study has a window."""
+    problem = study.problem
+    (recording,) = problem.recordings.values()
+    pieces, of = cut_all([recording], 0.5 * float(np.ptp(recording.series.time)))
+    (whole,) = problem.scenarios.values()
+    study.__dict__["problem"] = replace(
+        problem,
+        recordings={p.name: p for p in pieces},
+        fit_on=tuple(of),
+        scenarios={p.name: whole.for_recording(p) for p in pieces},
+        cut_from={name: r.name for name, r in of.items()},
+    )
+    _put_fit(study, noise)
+
+
 def _put_fit(study: Study, noise: float) -> None:
     space = study.problem.space
-    group = study.results("r+").create_group("fit")
+    group = study.results("r+").create_group("fit", overwrite=True)
     unit = space.to_unit(np.array([STIFFNESS]))
     put(group, "estimate", np.array([STIFFNESS]), ["parameter"])
     put(group, "estimate_sd", np.array([2.0]), ["parameter"])

@@ -11,10 +11,12 @@ pytest.importorskip("scipy")
 pytest.importorskip("torch")
 
 from next_world import (
+    LIFT,
     NOISE,
     STIFFNESS,
     Fragile,
     LinearDrag,
+    cut_in_half,
     put_diagnosis,
     register,
     rope_study,
@@ -233,6 +235,18 @@ def test_motions_that_tear_the_object_are_avoided(tmp_path: Path) -> None:
     found = propose(study, simulations=40, max_speed=1.0, max_acceleration=10.0)
     assert found.result["failed"] > 0
     assert found.result["motion"]["peak_speed"] <= Fragile.strength * 1.02  # the command is sampled more finely
+
+
+def test_a_recording_that_is_fitted_in_pieces_was_moved_in_one_go(tmp_path: Path) -> None:
+    study = rope_study(tmp_path, motion=LIFT)
+    put_diagnosis(study, "named", ["linear-drag"])
+    whole = propose(study).result["limits"]
+    assert whole["workspace"][4:] == [-0.1, pytest.approx(0.4, abs=1e-3)] and whole["duration"] == pytest.approx(1.96)
+    cut_in_half(study)
+    tied_drags(study)
+    found = propose(study, simulations=30).result
+    assert found["limits"] == {**whole, "workspace": pytest.approx(whole["workspace"], abs=0.02)}
+    assert found["repeat"]["name"] == "slow once more"
 
 
 def test_the_same_seed_proposes_the_same_motion(tmp_path: Path) -> None:

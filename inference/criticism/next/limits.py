@@ -114,7 +114,7 @@ def limits_within(
     than it did, but for upwards.
 
     Args:
-        scenarios: of the recordings.
+        scenarios: of the recordings, each as it was moved in one go.
         max_speed, max_acceleration, workspace, max_turn, max_turn_speed, duration, rate: as of :class:`Limits`.
     """
     scenarios = list(scenarios)

@@ -16,6 +16,7 @@ from ....core.parameters import ParameterSpace
 from ....core.registry import REGISTRY
 from ....core.store import put, read, storage_errors
 from ....core.study import Problem, Study
+from ....core.study.windows import joined
 from ...sequential.fitting import offsets_of
 from ...sequential.result import FitResult, load_fit
 from ..told import Told
@@ -79,7 +80,8 @@ def propose_next(
     scenario = problem.scenarios[problem.fit_on[0]]
     if not scenario.grasps:
         raise InputError(f"{study.path}: no gripper holds the object, so there is no motion to propose")
-    limits = limits_within(problem.scenarios.values(), **asked)
+    whole = joined(problem.scenarios, problem.cut_from)  # a robot is moved from where a recording starts, not a piece
+    limits = limits_within(whole.values(), **asked)
     fit, opening = load_fit(study), opening_of(study, effects)
     noise = fit.noise
     known = knowing(problem, {n: REGISTRY.get("effect", n) for n in opening.all_effects})
@@ -95,7 +97,7 @@ def propose_next(
         )
         start = scenario.motion.at(scenario.times[:1])[0]
         search = Search(bench, goal, limits, start, fastest_swing(limits, frame_rate), study.config.study.seed)
-        found = search.run(known_shapes(problem.scenarios, limits), simulations)
+        found = search.run(known_shapes(whole, limits), simulations)
         spent += bench.count
     result = _result(study, opening, limits, found, goal, spent, time.monotonic() - began)
     paragraphs = explain(result, limits.text())
