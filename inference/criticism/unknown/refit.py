@@ -14,6 +14,7 @@ from ...residuals import Offsets
 from ..held_out import held_out_residuals
 from .estimate import ForceObjective
 from .held import held_objective
+from .library import Piece
 from .search import Guess
 
 #: Name of the effect.
@@ -31,18 +32,23 @@ class RefittedLaw:
     """The model with a law.
 
     Args:
-        name: what it is made of.
+        pieces: that it was made of; those of which no coefficient is left are no part of it.
         space: parameters and coefficients.
         base: number of the parameters that are not coefficients of the law.
         fit: polished together, in units of the noise.
         held_out: root mean square error on each held-out recording [unit].
     """
 
-    name: str
+    pieces: tuple[Piece, ...]
     space: ParameterSpace
     base: int
     fit: Polished
     held_out: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """What it is made of."""
+        return " + ".join(p.name for p in self.pieces if set(p.coefficients) & set(self.coefficients))
 
     @property
     def rss(self) -> float:
@@ -71,6 +77,16 @@ def distinct(laws: list[RefittedLaw]) -> list[RefittedLaw]:
     for law in sorted(laws, key=lambda c: c.rss):
         out.setdefault(frozenset(law.terms), law)
     return list(out.values())
+
+
+def _without(law: RefittedLaw, coefficient: str) -> RefittedLaw:
+    """Not yet polished; what only says where the coefficient acts goes with the last one that acts there."""
+    left = set(law.coefficients) - {coefficient}
+    left -= {name for p in law.pieces if not left & set(p.coefficients) for name, _ in p.fixed}
+    gone = {f"{LAW}.{name}" for name in set(law.coefficients) - left}
+    kept = [k for k, name in enumerate(law.space.names) if name not in gone]
+    space = ParameterSpace(tuple(list(law.space)[k] for k in kept))
+    return RefittedLaw(law.pieces, space, law.base, replace(law.fit, unit=law.fit.unit[kept]))
 
 
 class Refits:
@@ -117,7 +133,7 @@ class Refits:
             starts.append(np.clip(np.concatenate([unit + shift * guess.shift, theta]), 0.01, 0.99))
         sizes = [np.inf if w is None else float(w @ w) for w in objective.many(np.stack(starts))]
         fit = polish(objective, starts[int(np.argmin(sizes))], FIRST_EVALUATIONS)
-        return RefittedLaw(" + ".join(guess.pieces), objective.space, base, fit)
+        return RefittedLaw(guess.pieces, objective.space, base, fit)
 
     def more(self, law: RefittedLaw) -> RefittedLaw:
         """Polished to the end, without coefficients that are not clearly off zero."""
@@ -126,9 +142,7 @@ class Refits:
             faint = self._faintest(law)
             if faint is None:
                 break
-            kept = [k for k in range(len(law.space)) if k != faint]
-            space = ParameterSpace(tuple(p for k, p in enumerate(law.space) if k != faint))
-            law = self._polished(RefittedLaw(law.name, space, law.base, replace(law.fit, unit=law.fit.unit[kept])))
+            law = self._polished(_without(law, faint))
         return replace(law, held_out=self.held_out(law.space, law.fit.unit))
 
     def _polished(self, law: RefittedLaw) -> RefittedLaw:
@@ -136,13 +150,13 @@ class Refits:
         fit = polish(objective, law.fit.unit, MORE_EVALUATIONS)
         return replace(law, space=objective.space, fit=fit)
 
-    def _faintest(self, law: RefittedLaw) -> int | None:
-        """Number, in the space, of the coefficient that is least off zero, if it is not clearly so."""
+    def _faintest(self, law: RefittedLaw) -> str | None:
+        """The coefficient that is least off zero, if it is not clearly so."""
         clear = {n: abs(mean) / max(sd, 1e-300) for n, (mean, sd, _) in law.terms.items() if n not in _PLACES}
         name = min(clear, key=clear.__getitem__)
         if clear[name] >= CLEAR or len(clear) == 1:
             return None
-        return law.space.names.index(f"{LAW}.{name}")
+        return name
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> dict[str, float]:
         """Root mean square error on every held-out recording [unit]; infinite where it cannot be simulated."""

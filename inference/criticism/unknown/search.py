@@ -18,14 +18,14 @@ class Guess:
     """A law as the linearised residuals have it.
 
     Args:
-        pieces: names.
+        pieces: of which it has a coefficient.
         coefficients: by name; those that it is not linear in among them.
         shift: of the parameters in the unit cube ``(D,)``.
         score: -2 log likelihood plus its penalty.
         rss: residual sum of squares that it promises.
     """
 
-    pieces: tuple[str, ...]
+    pieces: tuple[Piece, ...]
     coefficients: dict[str, float]
     shift: FloatArray
     score: float
@@ -111,4 +111,4 @@ def _pruned(model: LinearModel, names: tuple[str, ...], pieces: tuple[Piece, ...
     for piece in used:
         if any("@" in c for c in piece.columns):
             told.update(dict(piece.fixed))
-    return Guess(tuple(p.name for p in used), told, found[: model.base], model.score(rss, len(names)), rss)
+    return Guess(used, told, found[: model.base], model.score(rss, len(names)), rss)

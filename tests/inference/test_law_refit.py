@@ -1,0 +1,63 @@
+"""What is left of a guessed law once it is refitted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.criticism.unknown.decision import Case, decide
+from muslin.inference.criticism.unknown.library import Piece
+from muslin.inference.criticism.unknown.refit import LAW, Refits, RefittedLaw
+from muslin.inference.criticism.unknown.result import law_table
+from muslin.inference.polish import Polished
+from muslin.plugins.effects.law import Law
+
+COUNT = 1000
+DRAG = Piece("linear drag", ("linear_drag",))
+WAVE = Piece("oscillating acceleration", ("sine_x", "sine_y", "cosine_z"), (("frequency", 2.0),))
+PUSH = Piece("uniform acceleration", ("acceleration_x", "acceleration_y"))
+
+
+class Found(Refits):
+    """Whose polish ends at ``values``, each known to 0.1."""
+
+    def __init__(self, values: dict[str, float]) -> None:
+        self.values = values
+
+    def _polished(self, law: RefittedLaw) -> RefittedLaw:
+        names = law.coefficients
+        unit = law.space.to_unit(np.array([0.5, *(self.values[n] for n in names)]))
+        width = np.array([p.high - p.low for p in law.space])
+        return replace(
+            law, fit=Polished(unit, np.ones(COUNT), np.zeros((COUNT, len(unit))), np.diag(0.01 / width**2), COUNT)
+        )
+
+    def held_out(self, space: ParameterSpace, unit: np.ndarray) -> dict[str, float]:
+        return {"other": 0.003}
+
+
+def refitted(values: dict[str, float], *pieces: Piece) -> RefittedLaw:
+    known = {p.name.removeprefix(f"{LAW}."): p for p in Law.parameters()}
+    space = ParameterSpace((Parameter("stiffness", "Pa", 0.0, 1.0), *(known[n] for n in values)))
+    start = Polished(np.full(len(space), 0.5), np.ones(COUNT), np.zeros((COUNT, len(space))), np.eye(len(space)), COUNT)
+    return Found(values).more(RefittedLaw(pieces, space, 1, start))
+
+
+def test_a_frequency_goes_with_the_last_that_has_it_and_so_does_the_name() -> None:
+    law = refitted({"linear_drag": 3.0, "sine_x": 0.01, "sine_y": 0.2, "frequency": 2.0}, DRAG, WAVE)
+    assert (law.name, law.coefficients) == ("linear drag", ("linear_drag",))
+    case = Case(9.0 * COUNT, COUNT, {"other": 0.02}, 0.003, 0.01, laws=(law,))
+    assert case.penalised(law) == pytest.approx(COUNT + np.log(COUNT))  # one coefficient
+    told = law_table(case, decide(case).best)
+    assert told["pieces"] == "linear drag" and list(told["terms"]) == ["linear_drag"]
+
+
+def test_a_frequency_stays_while_anything_has_it() -> None:
+    law = refitted({"linear_drag": 0.1, "sine_x": 4.0, "sine_y": 0.01, "frequency": 0.05}, DRAG, WAVE)
+    assert (law.name, law.coefficients) == ("oscillating acceleration", ("sine_x", "frequency"))
+
+
+def test_a_piece_of_which_something_is_left_keeps_its_name() -> None:
+    law = refitted({"linear_drag": 3.0, "acceleration_x": 1.0, "acceleration_y": 0.1}, DRAG, PUSH)
+    assert (law.name, law.coefficients) == ("linear drag + uniform acceleration", ("linear_drag", "acceleration_x"))
