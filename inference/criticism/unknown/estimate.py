@@ -103,15 +103,18 @@ class Estimate:
 
     def covariance(self) -> FloatArray:
         """Of the point (Laplace), ``(D + sum K,) * 2``."""
-        hessian = sum(s.T @ s for s in self.slopes) + np.diag(self.unknowns.precisions(self.smooth))
-        return np.asarray(np.linalg.inv(hessian) * max(1.0, self.rss / max(self.count, 1.0)))
+        return np.asarray(np.linalg.inv(self._information() + np.diag(self.unknowns.precisions(self.smooth))))
 
     def degrees(self) -> float:
         """How many free numbers the data have given the force."""
-        information = sum(s.T @ s for s in self.slopes)
-        precisions = self.unknowns.precisions(self.smooth)
-        share = np.linalg.solve(information + np.diag(precisions), information)
+        information = self._information()
+        share = np.linalg.solve(information + np.diag(self.unknowns.precisions(self.smooth)), information)
         return float(np.trace(share))
+
+    def _information(self) -> FloatArray:
+        """Of the data, as they were weighed against the prior: misfit that is left makes them tell less."""
+        scale = max(1.0, self.rss / max(self.count, 1.0))
+        return np.asarray(sum(s.T @ s for s in self.slopes) / scale)
 
 
 class ForceObjective:
