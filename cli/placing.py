@@ -15,6 +15,7 @@ from ..core.registry import REGISTRY
 from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
+from ..core.study.objects import keep_points
 from .study_file import plan_table
 from .study_plan import Plan
 
@@ -60,7 +61,7 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
         return plan, []
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
     if plan.markers is None and not sized and starts_measured(plan, used):
-        return _measured(plan, measured, study)
+        return _measured(plan, measured)
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
     if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
@@ -74,12 +75,12 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
     return _on_nearest(plan, measured, study, count)
 
 
-def _measured(plan: Plan, measured: Measurement, study: Path) -> tuple[Plan, list[str]]:
+def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
     """Through the markers of the first frame, which stand beside the rope if their distances say so."""
     plan = replace(plan, start="measured")
     remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
-    problem = build_problem(parse_config(plan_table(plan), str(study)), measured, study.parent)
-    rough = np.concatenate([fourth_differences(problem.recordings[name].series.points) for name in plan.fit_on])
+    fitted = [keep_points(measured[name], plan.points) for name in plan.fit_on]
+    rough = np.concatenate([fourth_differences(r.series.points) for r in fitted])
     noise = robust_sd(rough) if len(rough) else 0.0
     if 0.0 < noise < _FAR_BETTER * MEASURED_NEAR:
         plan = replace(plan, near=MEASURED_NEAR)
@@ -87,7 +88,7 @@ def _measured(plan: Plan, measured: Measurement, study: Path) -> tuple[Plan, lis
             f"the noise is {1e3 * noise:.2g} mm, which no model of a rope in motion comes near; the model is meant to "
             f"come within {1e3 * MEASURED_NEAR:g} mm ([noise] sd)"
         )
-    away = standing_off([problem.recordings[name] for name in plan.fit_on])
+    away = standing_off(fitted)
     if away:
         plan = replace(plan, markers="beside")
         remarks.append(

@@ -17,7 +17,8 @@ from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
 from ..core.store import write_text
 from ..core.study import build_problem, parse_config
-from ..core.study.objects import grasps_of, object_of
+from ..core.study.choice import chosen
+from ..core.study.objects import grasps_of, keep_points, object_of
 from .console import command, next_step, say
 from .gridding import Grid, laid_over, seen_grid
 from .output import check_output
@@ -48,10 +49,19 @@ def new(
         str, typer.Option(metavar="NAME", help="The posterior estimator; muslin plugins lists them.")
     ] = "bayessim-rkhs",
     fit_on: Annotated[
-        str, typer.Option(metavar="A,B", help="Recordings that the fit sees; default all that are not held out.")
+        str,
+        typer.Option(
+            metavar="A,B",
+            help="Recordings that the fit sees; default all that are not held out, or of more than nine five.",
+        ),
     ] = "",
     hold_out: Annotated[
-        str, typer.Option(metavar="C", help="Recordings kept back, on which every claim is checked; default none.")
+        str,
+        typer.Option(
+            metavar="C",
+            help="Recordings kept back, on which every claim is checked; default none, or four where the fit sees five "
+            "of many.",
+        ),
     ] = "",
     size: Annotated[
         str,
@@ -97,10 +107,9 @@ def new(
             f"{measurement} is not a measurement; first: muslin import {measurement} -o {measurement.stem}.zarr"
         )
     measured = load_measurement(measurement)
-    held = _names(hold_out, measured, "--hold-out")
-    fitted = _names(fit_on, measured, "--fit-on") or [n for n in measured.names if n not in held]
-    if not fitted:
-        raise InputError("--hold-out names every recording, so nothing is left to fit on; leave one out")
+    compared = _numbers(points, int, "--points") or None
+    fitted, held = _names(fit_on, measured, "--fit-on"), _names(hold_out, measured, "--hold-out")
+    fitted, held, remarks = _takes(fitted, held, measured, compared)
     sizes = _numbers(size, float, "--size")
     if mesh and sizes:
         raise InputError("--size does not go with --mesh, which has a size of its own; use --mesh-scale")
@@ -118,7 +127,8 @@ def new(
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
     placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
-    grid, remarks = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
+    grid, more = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
+    remarks += more
     if grid is not None:
         table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
     own = parse_config(whole, str(study)).scenario
@@ -137,7 +147,7 @@ def new(
         mesh=own.mesh,
         mesh_scale=mesh_scale,
         grasp_points=table.get("grasp_points"),
-        points=_numbers(points, int, "--points") or None,
+        points=compared,
         markers=parse_markers(markers) if grid is None else grid.markers,
         extractor=extractor,
         spacing="measured" if grid is not None and grid.uneven else None,
@@ -161,6 +171,25 @@ def new(
     for remark in remarks:
         say(f"  {remark}")
     next_step(command("fit", study), note="look through the study file first")
+
+
+def _takes(
+    fitted: list[str], held: list[str], measured: Measurement, compared: list[int] | None
+) -> tuple[list[str], list[str], list[str]]:
+    """What is fitted and what is held out, as the person says or else as suits so many takes; remarks."""
+    if fitted or held:
+        fitted = fitted or [n for n in measured.names if n not in held]
+        if not fitted:
+            raise InputError("--hold-out names every recording, so nothing is left to fit on; leave one out")
+        return fitted, held, []
+    fitted, held = chosen([keep_points(r, compared) for r in measured.recordings])
+    if not held:
+        return fitted, held, []
+    total = len(measured.names)
+    rest = total - len(fitted) - len(held)
+    others = f"; the other {rest} stay in the measurement, untouched" if rest else ""
+    told = f"chosen of {total} takes, evenly from the slowest start to the fastest{others}"
+    return fitted, held, [f"{told}; --fit-on and --hold-out choose otherwise"]
 
 
 def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool) -> tuple[Grid | None, list[str]]:

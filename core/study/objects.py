@@ -50,6 +50,19 @@ def obstacles_of(table: ScenarioTable, folder: Path) -> tuple[Obstacle, ...]:
     return tuple(o.build(folder) for o in table.obstacles)
 
 
+def keep_points(recording: Recording, points: list[int] | None) -> Recording:
+    """The recording with only those ``points``, all where none are named."""
+    if points is None:
+        return recording
+    series, count = recording.series, recording.series.points.shape[1]
+    wrong = [p for p in points if not 0 <= p < count]
+    if wrong:
+        raise InputError(
+            f"[scenario.points]: recording {recording.name!r} has points 0 to {count - 1}, there is no {wrong[0]}"
+        )
+    return replace(recording, series=replace(series, points=series.points[:, points]))
+
+
 def build_scenario(
     table: ScenarioTable, recording: Recording, folder: Path, marked: bool = True, beside: Beside | None = None
 ) -> Scenario:

@@ -30,7 +30,7 @@ from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import StudyConfig
 from .inferred import effect_values, material_parameters
-from .objects import build_scenario, check_unstretched
+from .objects import build_scenario, check_unstretched, keep_points
 from .windows import cut_all
 
 
@@ -145,7 +145,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     fitted, whole = cut_all(fitted, config.study.window)
     fit_on = tuple(r.name for r in fitted)
     base = preset(config.scenario.name)
-    recordings = {r.name: _keep_points(r, config.scenario.points) for r in (*fitted, *held)}
+    recordings = {r.name: keep_points(r, config.scenario.points) for r in (*fitted, *held)}
     options = dict(config.extractor.options)
     if isinstance(options.get("weights"), str):
         options["weights"] = str(folder / options["weights"])
@@ -177,7 +177,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
     if config.scenario.start == "measured":
         kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])
         scenarios = {n: replace(s, kept=kept) for n, s in scenarios.items()}
-        scenarios |= {n: with_earlier(scenarios[n], _keep_points(r, config.scenario.points)) for n, r in whole.items()}
+        scenarios |= {n: with_earlier(scenarios[n], keep_points(r, config.scenario.points)) for n, r in whole.items()}
     material = with_fields(base.default_material(kind), dict(config.material))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
     for name in config.diagnose.candidates or []:
@@ -234,15 +234,3 @@ def _plugin(kind: str, name: str, options: dict[str, Any]) -> Any:
             raise
         told = ", ".join(f"{k} = {v!r}" for k, v in options.items())
         raise InputError(f"[{kind}] {name!r} cannot be made with {told}: {error}") from error
-
-
-def _keep_points(recording: Recording, points: list[int] | None) -> Recording:
-    if points is None:
-        return recording
-    series, count = recording.series, recording.series.points.shape[1]
-    wrong = [p for p in points if not 0 <= p < count]
-    if wrong:
-        raise InputError(
-            f"[scenario.points]: recording {recording.name!r} has points 0 to {count - 1}, there is no {wrong[0]}"
-        )
-    return replace(recording, series=replace(series, points=series.points[:, points]))

@@ -16,16 +16,13 @@ from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.registry import REGISTRY
 from muslin.core.study import Study, read_config, write_config
+from muslin.core.study.choice import chosen, start_speed
 from muslin.core.study.config import ParameterTable
 
 sys.path.insert(0, str(Path(__file__).parents[1]))  # for when it is run as a script
 from published import DATA, ROOT
 
 EXAMPLES = ROOT / "examples"
-
-#: Takes of a cable, fitted on and held out, all of their 5 s: spread evenly from that which starts slowest to that
-#: which starts fastest, alternately. The others are never used, and the error on them is told, too.
-CABLE_TAKES = (5, 4)
 
 #: Takes of the beam, two of each load. One is fitted, the others are held out.
 BEAM_TAKES = ("gravity-b", "gravity-a", "load52-a", "load52-b", "load101-a", "load101-b")
@@ -109,27 +106,14 @@ def beam(take: str, told: str = "", offset: float = 0.0) -> Case:
     return Case(f"beam{told}", EXAMPLES / "beam/data", make)
 
 
-def start_speed(recording: Recording) -> float:
-    """How fast the fastest marker is at the start [m/s], infinite where one is not seen: nothing can start there."""
-    steps = np.diff(recording.series.points[:6], axis=0)
-    speed = np.linalg.norm(steps, axis=2).max(axis=1) / np.diff(recording.series.time[:6])
-    return float(np.median(speed)) if np.isfinite(speed).all() else float("inf")
-
-
-def spread(takes: Sequence[Recording], count: int) -> list[Recording]:
-    """The middle one of each of ``count`` parts of ``takes`` that are as long as one another."""
-    return [takes[int((k + 0.5) * len(takes) / count)] for k in range(count)]
-
-
 def cable(number: int) -> Case:
+    """All 5 s of the takes that a new study chooses. The others are never used, and the error on them is told, too."""
     path = DATA / f"cable/cable{number}.npz"
 
     def make(folder: Path, workers: int | None) -> Study:
         takes = sorted((r for r in takes_of("deform-cable", path) if np.isfinite(start_speed(r))), key=start_speed)
-        used = spread(takes, sum(CABLE_TAKES))
         config = read_config(EXAMPLES / "cable/study.toml")
-        config.study.hold_out = [r.name for r in used[1::2]]
-        config.study.fit_on = [r.name for r in used[0::2]]
+        config.study.fit_on, config.study.hold_out = chosen(takes)
         write_config(config, folder / "study.toml")
         save_measurement(Measurement(tuple(takes)), folder / config.study.measurement)
         return Study.load(folder / "study.toml", workers=workers)

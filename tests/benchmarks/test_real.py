@@ -11,35 +11,12 @@ import real
 import real_measures
 import zarr
 from real import COLUMNS, TITLES, joined, markdown, rms
-from real_cases import BEAM_TAKES, BEAMS, CASES, Case, on_pybullet, spread, start_speed
+from real_cases import BEAM_TAKES, BEAMS, CASES, Case, on_pybullet
 from real_measures import bootstrap, measures, to_surface, within
 
 from muslin.core.body import cloth_grid
-from muslin.core.measurement import Recording
 from muslin.core.parameters import Parameter, ParameterSpace
-from muslin.core.series import PointSeries
 from muslin.core.store import put
-
-
-def moving(speed: float, hidden: bool = False) -> Recording:
-    time = 0.01 * np.arange(50)
-    points = np.zeros((50, 3, 3))
-    points[:, 1, 0] = speed * time
-    if hidden:
-        points[2, 0] = np.nan
-    return Recording("take", PointSeries(time, points))
-
-
-def test_the_speed_at_the_start_is_that_of_the_fastest_marker() -> None:
-    assert np.isclose(start_speed(moving(0.7)), 0.7)
-    assert start_speed(moving(0.0)) == 0.0
-    assert start_speed(moving(0.7, hidden=True)) == np.inf
-
-
-def test_takes_that_are_spread_are_the_middles_of_even_parts() -> None:
-    takes = [moving(0.1 * k) for k in range(15)]
-    assert spread(takes, 5) == [takes[k] for k in (1, 4, 7, 10, 13)]
-    assert spread(takes, 15) == takes
 
 
 def test_the_table_has_a_column_a_title_and_says_what_is_missing() -> None:

@@ -1,0 +1,65 @@
+"""Which takes ``muslin new`` chooses where nobody says, and how it says so."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from muslin.cli import main
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.measurement_store import save_measurement
+from muslin.core.motion import Motion
+from muslin.core.scenarios import preset
+from muslin.core.series import PointSeries
+from muslin.core.study import read_config
+
+COUNT = 14
+
+
+def status(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as caught:
+        main.run([str(a) for a in arguments])
+    return int(caught.value.code or 0)
+
+
+@pytest.fixture
+def takes(tmp_path: Path) -> Path:
+    """Of a rope that sways, the first fastest."""
+    pytest.importorskip("mujoco")
+    rest = preset("cable").scenario(size=[0.6], vertices=[11]).start_vertices()
+    time = np.linspace(0.0, 0.2, 21)
+    out = []
+    for k in range(COUNT):
+        sway = np.zeros((21, 1, 3))
+        sway[:, 0, 1] = 0.1 * (COUNT - k) * time
+        ends = (rest + sway)[:, [0, -1]]
+        out.append(Recording(str(k), PointSeries(time, rest[::2] + sway), Motion.from_positions(time, ends)))
+    save_measurement(Measurement(tuple(out)), tmp_path / "m.zarr")
+    return tmp_path / "m.zarr"
+
+
+def test_of_many_takes_five_are_fitted_and_four_held_out(takes: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = takes.with_name("s.toml")
+    assert status("new", path, "--measurement", takes, "--scenario", "cable") == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "chosen of 14 takes, evenly from the slowest start to the fastest; the other 5 stay in the" in said
+    assert "untouched; --fit-on and --hold-out choose otherwise" in said and "nothing is held out" not in said
+    study = read_config(path).study
+    assert study.fit_on == ["13", "10", "6", "3", "0"] and study.hold_out == ["11", "8", "5", "2"]
+
+
+@pytest.mark.parametrize(
+    "option, fitted, held_out",
+    [
+        ("--fit-on", ["3"], []),
+        ("--hold-out", [str(k) for k in range(COUNT) if k != 3], ["3"]),
+    ],
+)
+def test_who_says_one_of_them_is_asked_no_more(
+    takes: Path, capsys: pytest.CaptureFixture[str], option: str, fitted: list[str], held_out: list[str]
+) -> None:
+    path = takes.with_name("s.toml")
+    assert status("new", path, "--measurement", takes, "--scenario", "cable", option, "3") == 0
+    assert "chosen of" not in capsys.readouterr().out
+    study = read_config(path).study
+    assert study.fit_on == fitted and study.hold_out == held_out
