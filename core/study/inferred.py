@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 
 from ..effect import Effect
-from ..errors import InputError
+from ..errors import InputError, RolloutFailed
 from ..material import UNITS, Material, with_fields
 from ..parameters import Parameter
 from ..registry import nearest
@@ -84,6 +84,8 @@ def _check_ends(effect: type[Effect], ends: list[dict[str, float]], material: Ma
         try:
             if not one.is_off:
                 one.relaxed(one.on_material(material))
+        except RolloutFailed:  # with another material it may not: a draw fails, no study
+            continue
         except InputError as error:
             told = ", ".join(f"{name} = {value:g}" for name, value in values.items())
             raise InputError(f"[effects.{effect.name}] with {told}: {error}") from error
