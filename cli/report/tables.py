@@ -132,7 +132,9 @@ def candidate_rows(found: Findings) -> list[Table]:
                 "name": words(str(c["name"])),
                 "named": c["name"] in named,
                 "coefficients": coefficients(c),
-                "explained": share(c.get("explained")),
+                "explained": "not tried"
+                if d.get("budget_spent") and not c.get("tried", True)
+                else share(c.get("explained")),
                 "width": round(100 * min(max(number(c.get("explained")) or 0.0, 0.0), 1.0), 1),
                 "z": _z(c.get("z")),
                 "after": length(c.get("held_out_after"), e["unit"]),

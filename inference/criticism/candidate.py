@@ -34,6 +34,7 @@ class Candidate:
         promised: residual sum of squares that a linear model promised at the first look.
         approached: the curvature is of a search from near here rather than of the first look.
         refitted: polished to the end, so what it leaves is what it cannot explain.
+        tried: simulated beyond its first look, or it moves nothing; else nothing is known of what it explains.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Candidate:
     promised: float = float("inf")
     approached: bool = False
     refitted: bool = False
+    tried: bool = False
 
     @property
     def rss(self) -> float:

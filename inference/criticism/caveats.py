@@ -93,6 +93,20 @@ def invisible(result: dict[str, Any]) -> str:
     return f"Not visible in these data, so neither ruled in nor out: {', '.join(hidden)}." if hidden else ""
 
 
+def untried(result: dict[str, Any]) -> str:
+    """The candidates that the budget did not come to: nothing rules them out."""
+    if not result["budget_spent"] or result["verdict"] not in ("named", "tied", "none"):
+        return ""
+    told = (*result["effects"], *result["further"])
+    names = sorted(c["name"] for c in result["candidates"] if not c["tried"] and c["name"] not in told)
+    if not names:
+        return ""
+    return (
+        f"Not tried, as the budget ended after {result['simulations']} simulations: {', '.join(names)}; allow more "
+        "([diagnose] simulations), and diagnose again."
+    )
+
+
 def length(value: float, unit: str) -> str:
     """A length for people: millimetres for metres."""
     return f"{1e3 * value:.1f} mm" if unit == "m" else f"{value:.2f} {unit}"

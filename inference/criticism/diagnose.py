@@ -146,6 +146,7 @@ def _result(
                 "held_out_shows": c.shown_held_out if held else None,
                 "identifiability": c.surviving if c.visible else 0.0,
                 "refitted": c.refitted,
+                "tried": c.tried,
             }
         )
     changed = found.verdict in ("named", "tied")

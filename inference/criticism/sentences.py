@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.effect import Effect
 from ...core.study import Study
-from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable
+from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable, untried
 from .verdict import EXPLAINS, MARGIN
 
 #: Candidates that explain at least this share are told one by one.
@@ -36,6 +36,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
         "unrepeatable": unrepeatable(result),
         "unchecked": _unchecked(result),
         "alternatives": _alternatives(result),
+        "untried": untried(result),
         "invisible": invisible(result),
         "to_be_sure": _to_be_sure(study, result),
     }
@@ -164,9 +165,13 @@ def _alternatives(result: dict[str, Any]) -> str:
     near = [c for c in rivals if c["explained"] > _WORTH_TELLING]
     if not near:
         visible = [c for c in rivals if c["objection"] != "invisible"]
-        if not visible:
+        tried = [c for c in visible if c["tried"]]
+        if not tried:
             return ""
-        return f"Ruled out: all {len(visible)} others that these data can show; none explains a fifth of the misfit."
+        every = f"all {len(tried)} others that these data can show"
+        if len(tried) < len(visible):
+            every = f"{len(tried)} of {len(visible)} others that these data can show"
+        return f"Ruled out: {every}; none explains a fifth of the misfit."
     said = "; ".join(f"{c['name']} ({100 * c['explained']:.0f} %: {_reason(c, result)})" for c in near[:4])
     rest = f"; and {len(near) - 4} more that explain less" if len(near) > 4 else ""
     return f"Ruled out: {said}{rest}."

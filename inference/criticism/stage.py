@@ -90,7 +90,7 @@ def run_stage(
 def _seen_only(look: Look, plain: Polished) -> Candidate:
     """A candidate that was looked at and no more."""
     fit = look.as_fit(plain, look.start, plain.white)
-    return Candidate(look.name, look.space, look.base, fit, promised=look.rss)
+    return Candidate(look.name, look.space, look.base, fit, promised=look.rss, tried=not look.responds)
 
 
 def _promises(look: Look, plain: Polished, tried: int) -> bool:
@@ -148,7 +148,7 @@ class _Tournament:
             if (k < FINALISTS or c.rss < near) and self.work.may_go_on():
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
-                found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True)
+                found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)
         return [found[name] for name in self.looks]
 
     def rescaled(self, candidate: Candidate, look: Look) -> Candidate:
@@ -197,6 +197,7 @@ class _Tournament:
         """The best of the candidate and of ``points``, and of one of these whose effect the parameters make up for."""
         if not self.work.may_go_on(self.until):
             return candidate
+        candidate = replace(candidate, tried=True)
         objective = self.work.objective((*self.effects, candidate.name))
         rows = best_starts(objective, points)
         if made_up_for and (point := self.made_up(rows)) is not None:

@@ -26,7 +26,7 @@ SCHEMA = {
 }  # fmt: skip
 CANDIDATE = {
     "name", "coefficients", "explained", "z", "behind", "objection", "held_out_before", "held_out_after",
-    "held_out_shows", "identifiability", "refitted",
+    "held_out_shows", "identifiability", "refitted", "tried",
 }  # fmt: skip
 ERROR = {"noise", "noise_error", "before", "after", "unit", "held_out", "fitted_before", "fitted_after"}
 
@@ -104,6 +104,9 @@ def test_a_small_budget_still_gives_a_ranking(tmp_path: Path) -> None:
     assert result["candidates"][0]["name"] in ("air-drag", "viscous-damping")
     assert result["simulations"] < 500
     assert result["budget_spent"]
+    assert not all(c["tried"] for c in result["candidates"])
+    if result["verdict"] in ("named", "tied", "none"):
+        assert "Not tried, as the budget ended after" in result["told"]["untried"]
 
 
 @pytest.mark.slow

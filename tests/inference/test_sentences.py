@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest
+from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest, untried
 from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
 
@@ -90,6 +90,20 @@ def test_what_is_told_of_is_not_told_as_invisible() -> None:
     told = invisible({"effects": ["wind"], "further": ["lag"], "candidates": rows})
     assert told == "Not visible in these data, so neither ruled in nor out: drag."
     assert not invisible({"effects": ["wind", "drag"], "further": ["lag"], "candidates": rows})
+
+
+def test_what_the_budget_did_not_come_to_is_not_ruled_out() -> None:
+    rows = [
+        {"name": n, "tried": tried, "explained": share, "objection": "chance"}
+        for n, tried, share in (("drag", True, 0.9), ("wind", True, 0.1), ("lag", False, 0.0), ("hem", False, 0.0))
+    ]
+    about = {"verdict": "named", "effects": ["drag"], "further": [], "simulations": 122, "candidates": rows}
+    assert _alternatives(about).startswith("Ruled out: 1 of 3 others that these data can show; none explains")
+    cut = untried(about | {"budget_spent": True})
+    assert cut.startswith("Not tried, as the budget ended after 122 simulations: hem, lag; allow more")
+    assert not untried(about | {"budget_spent": False})
+    assert not untried(about | {"budget_spent": True, "verdict": "no-misfit"})
+    assert not _alternatives(about | {"candidates": [rows[0], rows[2]]})
 
 
 def test_held_out_motions_that_show_nothing_are_told() -> None:

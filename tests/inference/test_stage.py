@@ -75,6 +75,16 @@ def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
     work.count = 800  # most of it went before anything could be refitted
     (found,) = tournament.run()
     assert refitted == [("drag",)] and found.refitted and found.rss == pytest.approx(COUNT)
+    assert found.tried
+
+
+@pytest.mark.parametrize("spent", [True, False])
+def test_a_candidate_that_the_budget_does_not_come_to_is_not_tried(spent: bool) -> None:
+    work, tournament = bench(lambda effects, unit, *_: candidate("drag", 3 * COUNT).fit)
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
+    work.count = work.limit if spent else 0
+    (found,) = tournament.run()
+    assert found.tried is not spent
 
 
 @pytest.mark.parametrize(("from_there", "reached"), [(1.0, 1.0), (3.0, 2.0)])
