@@ -12,6 +12,7 @@ from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.registry import REGISTRY
+from ..core.scenario import Scenario
 from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
@@ -20,6 +21,11 @@ from .study_file import plan_table
 from .study_plan import Plan
 
 _CHOICES = ("all", "bound", "surface", "nearest")
+#: At the start points are no further from where the model puts them than this share of the object's size; as the model
+#: does not know how a real object hangs they are some hundredths of it away.
+_ELSEWHERE = 0.4
+#: So many points at least whose spread beside their line is less than this share of that along it are on a line.
+_FEWEST_OF_A_LINE, _NARROW = 4, 0.02
 #: A point further than this share of the object's size from the mesh is probably in another frame.
 _FAR = 0.25
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
@@ -158,10 +164,15 @@ def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> t
         )
     distance = np.asarray(total / seen)
     ids = np.argmin(distance, axis=1)
+    if count > 1 and len(set(ids.tolist())) == 1:
+        spread = max(float(np.nanmax(np.ptp(r.series.points[0], axis=0))) for r in problem.recordings.values())
+        raise InputError(
+            f"all {count} points are nearest to one vertex of the object, which is {size:.3g} m large, while they are "
+            f"within {spread:.3g} m; give the size of the object in metres with --size, or import again with --unit"
+        )
     worst = distance[np.arange(count), ids]
-    remarks = [
-        f"the {count} points are placed on their nearest vertices, at most {worst.max():.3g} m away in the first frame"
-    ]
+    points = "the point is" if count == 1 else f"the {count} points are"
+    remarks = [f"{points} placed on the nearest vertices, at most {worst.max():.3g} m away in the first frame"]
     if worst.max() > _FAR * size:
         remarks.append(
             f"warning: point {int(worst.argmax())} is {worst.max():.3g} m from the object at the start; check the "
@@ -194,18 +205,42 @@ def doubtful_starts(problem: Problem) -> list[str]:
                 f"warning: the mesh is {parts} parts that do not hang together; sew them (merge vertices by distance), "
                 "or hold each"
             )
-        vertices = scenario.start_vertices()
-        first = recording.series.points[0]
-        first = first[np.isfinite(first).all(axis=1)]
-        if not len(first) or first.shape[1] != 3:
-            continue
-        apart = float(np.linalg.norm(np.median(first, axis=0) - np.median(vertices, axis=0)))
-        if apart > 0.5 * float(np.ptp(vertices, axis=0).max()):
+        apart, size = _apart(recording, scenario), float(np.ptp(scenario.start_vertices(), axis=0).max())
+        if apart > _ELSEWHERE * size:
             remarks.append(
                 f"warning: {name} starts {apart:.2g} m away from where the model puts the object; check --up, the "
-                "unit, the gripper poses, the scenario and the size"
+                "unit, the gripper poses (x y z, then the quaternion w x y z), the scenario and the size"
+            )
+        if scenario.body.kind == "cloth" and _on_a_line(recording.series.points[0]):
+            remarks.append(
+                f"warning: all points of {name} start on one line; if they are those of a rope, give its length with "
+                "--size LENGTH"
             )
     return list(dict.fromkeys(remarks))
+
+
+def _apart(recording: Recording, scenario: Scenario) -> float:
+    """How far the points of the first frame are from where the model puts them, root mean square [m].
+
+    Of points that nothing tells apart, how far their middle is from that of the object; zero of none in space.
+    """
+    series, vertices = recording.series, scenario.start_vertices()
+    first = series.points[0]
+    seen = np.isfinite(first).all(axis=1)
+    if not seen.any() or first.shape[1] != 3:
+        return 0.0
+    if not series.correspondence or scenario.sampled:
+        return float(np.linalg.norm(np.median(first[seen], axis=0) - np.median(vertices, axis=0)))
+    return float(np.sqrt(np.mean(np.sum((first - scenario.markers @ vertices)[seen] ** 2, axis=1))))
+
+
+def _on_a_line(points: FloatArray) -> bool:
+    """Whether ``points (P, 3)``, four or more, lie on one line."""
+    seen = points[np.isfinite(points).all(axis=1)]
+    if len(seen) < _FEWEST_OF_A_LINE or points.shape[1] != 3:
+        return False
+    sizes = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    return bool(sizes[1] < _NARROW * sizes[0])
 
 
 def _parts(body: Body) -> int:

@@ -1,0 +1,70 @@
+"""``muslin new`` where the first frame and the model do not go together, and where they do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from muslin.cli.main import run
+from muslin.core.measurement import Measurement, Recording
+from muslin.core.measurement_store import save_measurement
+from muslin.core.motion import Motion, rotate
+from muslin.core.scenarios import preset
+from muslin.core.series import PointSeries
+
+AWAY, LINE = "away from where the model puts the object", "all points of one start on one line"
+#: A gripper that is turned by 60 degrees about x as it begins.
+TURN = np.array([np.cos(np.pi / 6), np.sin(np.pi / 6), 0.0, 0.0])
+
+
+def told(folder: Path, capsys: pytest.CaptureFixture[str], points: np.ndarray, turn: np.ndarray, *options: str) -> str:
+    poses = np.tile(np.concatenate([[0.0, 0.0, 1.0], turn]), (5, 1, 1))
+    times = np.linspace(0.0, 0.2, 5)
+    recording = Recording("one", PointSeries(times, np.tile(points, (5, 1, 1))), Motion(times, poses))
+    save_measurement(Measurement((recording,)), folder / "m.zarr", overwrite=True)
+    with pytest.raises(SystemExit) as caught:
+        run(["new", str(folder / "s.toml"), "--measurement", str(folder / "m.zarr"), *options])
+    printed = capsys.readouterr()
+    return printed.out if not caught.value.code else printed.err
+
+
+def sheet(turn: np.ndarray) -> np.ndarray:
+    """The 25 vertices of a cloth as a turned gripper holds it."""
+    body = preset("fling").body((0.3, 0.3), (5, 5))
+    return np.asarray(rotate(turn, body.vertices) + np.array([0.0, 0.0, 1.0]))
+
+
+def test_a_quaternion_in_another_order_is_seen_in_where_the_markers_are(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ("--scenario", "fling", "--size", "0.3,0.3", "--vertices", "5,5")
+    assert AWAY not in told(tmp_path, capsys, sheet(TURN), TURN, *options)
+    other = tmp_path / "other"
+    other.mkdir()
+    assert f"{AWAY}; check --up, the unit, the gripper poses (x y z, then the quaternion w x y z)" in told(
+        other, capsys, sheet(TURN), TURN[[1, 2, 3, 0]], *options
+    )
+
+
+@pytest.mark.parametrize("kept", ["20,21,22,23,24", "24"])
+def test_markers_on_a_part_of_the_object_are_where_they_should_be(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kept: str
+) -> None:
+    text = told(tmp_path, capsys, sheet(TURN), TURN, "--scenario", "fling", "--points", kept)
+    assert AWAY not in text
+
+
+def test_a_size_in_millimetres_puts_all_markers_on_one_vertex(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    hanging = np.linspace([0.0, 0.0, 1.0], [0.0, 0.0, 0.0], 11)
+    refused = told(tmp_path, capsys, hanging, upright, "--scenario", "swing", "--size", "1000")
+    assert "all 11 points are nearest to one vertex of the object, which is 1e+03 m large" in refused
+    assert "within 1 m; give the size of the object in metres with --size" in refused
+    assert not (tmp_path / "s.toml").exists()
+    assert f"{LINE}; if they are those of a rope, give its length" in told(
+        tmp_path, capsys, hanging, upright, "--scenario", "swing"
+    )
+    (tmp_path / "s.toml").unlink()
+    assert LINE not in told(tmp_path, capsys, hanging, upright, "--scenario", "swing", "--size", "1")
