@@ -28,8 +28,9 @@ class TrajectoryRows(Rows):
     """The standardised coordinates of every point in every frame, side by side: order matters.
 
     Column p is the p-th point, so this suits points that correspond. Of sets it can read the order in which they
-    come, or put every frame in lexicographic order first; either way the number of points is that of training, fewer
-    are filled up as unseen. Gaps are filled in from the other markers and frames.
+    come, or put every frame in lexicographic order first; either way the number of points is that of training: fewer
+    are filled up as unseen, and of more as many are taken, evenly along that order. Gaps are filled in from the other
+    markers and frames.
 
     Args:
         x: training draws, ``(N, T_r, P, A)`` a recording.
@@ -46,14 +47,7 @@ class TrajectoryRows(Rows):
         self.encoder = Encoder(self._ordered(x), (True,) * len(x), principal, torch.Generator().manual_seed(0))
 
     def _ordered(self, x: list[FloatArray]) -> list[FloatArray]:
-        out = []
-        for a, wanted in zip(x, self.sorted, strict=True):
-            if wanted:
-                seen = np.asarray(np.isfinite(a).all(axis=3))
-                z, seen = canonical(np.where(seen[..., None], a, 0.0), seen)
-                a = np.where(seen[..., None], z, np.nan)
-            out.append(a)
-        return out
+        return [_in_order(a) if wanted else a for a, wanted in zip(x, self.sorted, strict=True)]
 
     def coordinates(self, x: list[FloatArray]) -> list[Tensor]:
         """Standardised points ``(N, T_r, P, A)`` without gaps."""
@@ -67,11 +61,26 @@ class TrajectoryRows(Rows):
         if not self.sets[r] or missing == 0:
             return a
         if missing < 0:
-            raise InputError(
-                f"recording {r} has {a.shape[2]} points a frame, but training had {self.points[r]}, and this estimator "
-                "reads points by their place; draw at most as many, or use bayessim-rkhs, which takes any number"
-            )
+            return _thinned(_in_order(a) if self.sorted[r] else a, self.points[r])
         return np.concatenate([a, np.full((*a.shape[:2], missing, a.shape[3]), np.nan)], axis=2)
 
     def __call__(self, x: list[FloatArray]) -> list[Tensor]:
         return [torch.cat([z.flatten(1) for z in self.coordinates(x)], dim=1)]
+
+
+def _in_order(a: FloatArray) -> FloatArray:
+    """The points of every frame of ``(N, T, P, A)`` in lexicographic order, those not seen last."""
+    seen = np.asarray(np.isfinite(a).all(axis=3))
+    z, seen = canonical(np.where(seen[..., None], a, 0.0), seen)
+    return np.where(seen[..., None], z, np.nan)
+
+
+def _thinned(a: FloatArray, count: int) -> FloatArray:
+    """Of the points that are seen in each frame of ``(N, T, P, A)`` as many as ``count``, evenly along their order."""
+    seen = np.isfinite(a).all(axis=3)
+    first = np.argsort(~seen, axis=2, kind="stable")  # those that are seen, as they come
+    number = seen.sum(axis=2)[..., None]
+    places = np.arange(count)
+    evenly = np.round(places * (number - 1) / max(count - 1, 1)).astype(np.int64)
+    chosen = np.take_along_axis(first, np.where(number > count, evenly, places), axis=2)
+    return np.take_along_axis(a, chosen[..., None], axis=2)

@@ -1,6 +1,7 @@
 """NN-bulk, GP-bulk, and the Gaussian on the cube that both answer with."""
 
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from muslin.core.testing import estimators as kit
 
 torch = pytest.importorskip("torch")
 
+from muslin.inference.embedding.rows import TrajectoryRows  # noqa: E402
 from muslin.inference.estimators.gp_bulk import GPBulk  # noqa: E402
 from muslin.inference.estimators.nn_bulk import NNBulk  # noqa: E402
 from muslin.inference.posterior.cube_gaussian import cube_gaussian  # noqa: E402
@@ -37,9 +39,25 @@ def test_gp_bulk_conforms() -> None:
     kit.check_estimator(lambda: GPBulk(principal=6, tuning_draws=100, steps=20))
 
 
-def test_gp_bulk_reads_sets_in_any_order() -> None:
+def test_bulk_estimators_read_sets_in_any_order_and_of_every_size() -> None:
+    """Their rows are of one length: of more points than they learned from they take as many."""
     pytest.importorskip("botorch")
-    kit.check_permutation_invariant(lambda: GPBulk(correspondence=False, principal=4, steps=10))
+    for make in (partial(GPBulk, correspondence=False, principal=4, steps=10), partial(quick, correspondence=False)):
+        kit.check_permutation_invariant(make)
+        kit.check_varying_counts(make)
+
+
+def test_of_more_points_as_many_are_read_evenly_along_their_order() -> None:
+    rng = np.random.default_rng(0)
+    x = rng.random((30, 2, 5, 3))
+    rows = TrajectoryRows([x], (False,), True, 5)
+    many = np.sort(rng.random((1, 2, 13, 3)), axis=2)
+    (told,) = rows([many[:, :, rng.permutation(13)]])
+    (same,) = rows([many[:, :, [0, 3, 6, 9, 12]]])
+    torch.testing.assert_close(told, same)
+    many[0, 0, 4:] = np.nan  # four that are seen are all read, whatever is not
+    (told,), (same,) = rows([many]), rows([many[:, :, [0, 1, 2, 3, 12]]])
+    torch.testing.assert_close(told[:, :12], same[:, :12])  # the fifth is filled in, by the other frame too
 
 
 def test_gp_bulk_follows_a_curve_and_knows_its_noise() -> None:
