@@ -262,7 +262,7 @@ constant_offset = 0.0  # of the frame of the points [m]
 # Which effects to try; left out, every one that fits the object.
 # candidates = {_value(REGISTRY.names("effect"))}
 draws = {default.draws}  # starting points that are tried for each effect
-# simulations = 2000  # in all, at most; left out, what suits the object and the number of recordings
+# simulations = 2000  # in all, or a few more, as what has begun is ended; left out, what suits object and recordings
 """
 
 
