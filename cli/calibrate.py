@@ -10,7 +10,7 @@ from ..core.registry import REGISTRY
 from ..core.store import storage_errors
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
-from .output import check_output, write_json
+from .output import check_apart, check_output, check_result, write_json
 from .report import missing_extra
 from .steps import Force, StudyFile, Workers
 
@@ -57,11 +57,11 @@ def calibrate(
     except ImportError as error:
         raise missing_extra(error) from error
     target = output or study.with_name(f"{study.stem}.calibration.html")
-    for file in (target, json_file):  # minutes of simulation must not end at a misspelt folder
-        if file is not None:
-            check_output(file, force=True)
     with ProgressView() as progress:
         loaded = Study.load(study, workers=workers, progress=progress)
+        for file, ending in ((target, ".html"), (json_file, ".json")):
+            if file is not None:  # minutes of simulation must not end at a misspelt folder
+                check_result(file, ending, loaded)
         found = loaded.calibrate(simulations=simulations, predictive=predictive)
     say(found.text())
     if json_file is not None:
@@ -80,22 +80,24 @@ def export(
     force: Force = False,
 ) -> None:
     """Write the posterior of a fit for other programs, in the units of its parameters."""
+    loaded = Study.load(study)
+    check_apart(output, loaded)
     check_output(output, force)
     if kind == "slices":
-        _draw_slices(study, output)
+        _draw_slices(loaded, output)
         return
-    Study.load(study).export(kind, output, samples=samples, seed=seed)
+    loaded.export(kind, output, samples=samples, seed=seed)
     say(f"wrote {output}")
 
 
-def _draw_slices(study: Path, output: Path) -> None:
+def _draw_slices(study: Study, output: Path) -> None:
     if output.suffix != ".png":
         raise InputError(f"slices are written to a .png file, not to {output.name}")
     try:
         from .report.figures_slices import slices_figure
     except ImportError as error:
         raise missing_extra(error) from error
-    picture = slices_figure(*REGISTRY.get("step", "slices")(Study.load(study)))
+    picture = slices_figure(*REGISTRY.get("step", "slices")(study))
     with storage_errors(output):
         output.write_bytes(picture)
     say(f"wrote {output}")

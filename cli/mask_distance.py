@@ -9,7 +9,7 @@ from ..core.errors import InputError
 from ..core.registry import REGISTRY
 from ..core.video_store import load_videos
 from .console import say
-from .output import check_output, write_json
+from .output import check_result, write_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -45,7 +45,7 @@ def mask_distance(
     The distance is averaged over time; its mean and standard deviation are over the takes.
     """
     if json_file is not None:
-        check_output(json_file, force=True)
+        check_result(json_file, ".json")
     found = REGISTRY.get("step", "mask-distance")(
         load_videos(one),
         load_videos(other),

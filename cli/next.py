@@ -8,7 +8,7 @@ import typer
 from ..core.registry import REGISTRY
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
-from .output import check_output, write_json
+from .output import check_apart, check_output, check_result, write_json
 from .steps import Force, StudyFile, Workers
 
 Box = tuple[float, float, float, float, float, float]
@@ -57,11 +57,13 @@ def next_experiment(
     The file has the columns time,gripper,x,y,z,qw,qx,qy,qz in seconds and metres, z up; a recording of it is imported
     with the same file.
     """
-    for file, replace in ((output, force), (json_file, True)):
-        if file is not None:
-            check_output(file, replace)
     with ProgressView() as progress:
         loaded = Study.load(study, workers=workers, progress=progress)
+        if output is not None:
+            check_apart(output, loaded)
+            check_output(output, force)
+        if json_file is not None:
+            check_result(json_file, ".json", loaded)
         found = REGISTRY.get("step", "next")(
             loaded,
             effects=effects or (),

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..core.errors import InputError, MissingFileError
 from ..core.store import write_text
+from ..core.study import Study
 
 
 def check_output(path: Path, force: bool) -> None:
@@ -21,6 +22,31 @@ def check_output(path: Path, force: bool) -> None:
         raise InputError(f"{path} exists already; choose another name, or say --force to replace it")
     if not os.access(parent, os.W_OK):
         raise InputError(f"no permission to write in {parent}")
+
+
+def check_result(path: Path, ending: str, *studies: Study) -> None:
+    """Refuse a place for a result that every run writes anew; of what is there only a file of that ending is replaced.
+
+    Nothing of ``studies`` is replaced, see :func:`check_apart`.
+    """
+    for study in studies:
+        check_apart(path, study)
+    check_output(path, force=True)
+    if path.exists() and path.suffix != ending:
+        raise InputError(f"{path} exists already, and only a {ending} file is replaced; name one, or a new file")
+
+
+def check_apart(path: Path, study: Study) -> None:
+    """Refuse to write over a study, a file that it names or a store of its own, or into one, whatever was said."""
+    place, own = path.resolve(), study.path.resolve()
+    if place == own:
+        raise InputError(f"{path} is the study itself; name another file to write")
+    for what, store in (("measurement", study.measurement_path), ("results", study.results_path)):
+        if place.is_relative_to(store.resolve()):
+            raise InputError(f"{path} lies in the {what} of {study.path}; name a file outside of {store}")
+    named = [*study.config.scenario.files, study.config.extractor.options.get("weights")]
+    if place in [(own.parent / name).resolve() for name in named if isinstance(name, str)]:
+        raise InputError(f"{path} is a file that {study.path} needs; name another file to write")
 
 
 def write_json(path: Path, value: Any) -> None:

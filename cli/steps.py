@@ -10,7 +10,7 @@ from ..core.registry import REGISTRY
 from ..core.study import Study
 from .adding import add_commands, with_effect
 from .console import ProgressView, command, next_step, say
-from .output import check_output, write_json
+from .output import check_apart, check_output, check_result, write_json
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
 Workers = Annotated[
@@ -49,10 +49,11 @@ def compare(
     workers: Workers = None,
 ) -> None:
     """Hold the fitted simulator against every recording: how large the error is, where, when, and is it noise?"""
-    if json_file is not None:
-        check_output(json_file, force=True)
     with ProgressView() as progress:
-        result = Study.load(study, workers=workers, progress=progress).compare()
+        loaded = Study.load(study, workers=workers, progress=progress)
+        if json_file is not None:
+            check_result(json_file, ".json", loaded)
+        result = loaded.compare()
     say(result.text())
     if json_file is not None:
         write_json(json_file, result.to_json())
@@ -72,10 +73,11 @@ def diagnose(
     The verdict is one of: named (this effect), tied (these cannot be told apart), none (a misfit that no
     candidate explains), cannot-tell (the data could not show it), no-misfit.
     """
-    if json_file is not None:  # hours of simulation must not end at a misspelt folder
-        check_output(json_file, force=True)
     with ProgressView() as progress:
-        result = Study.load(study, workers=workers, progress=progress).diagnose()
+        loaded = Study.load(study, workers=workers, progress=progress)
+        if json_file is not None:  # hours of simulation must not end at a misspelt folder
+            check_result(json_file, ".json", loaded)
+        result = loaded.diagnose()
     say(result.text())
     verdict = result.to_json()
     if json_file is not None:
@@ -121,10 +123,9 @@ def add(
     source, what = (Path(effect), f"the law of {law}") if study is None else (study, effect)
     name = effect if law is None else "law"
     target = output or with_effect(source, name)
-    if target.resolve() == source.resolve():
-        raise InputError(f"{target} is the study itself; name another file with -o")
-    check_output(target, force)
     loaded = Study.load(source)
+    check_apart(target, loaded)
+    check_output(target, force)
     made = (
         loaded.add(effect, target, overwrite=force)
         if law is None
@@ -155,8 +156,9 @@ def report(
     """Write one self-contained HTML file: fit, errors over time, ranking of effects, before and after."""
     from .report import write_report
 
+    loaded, later = Study.load(study), Study.load(after) if after is not None else None
     if output is not None:
-        check_output(output, force=True)
-    made = write_report(Study.load(study), output, Study.load(after) if after is not None else None)
+        check_result(output, ".html", *(s for s in (loaded, later) if s is not None))
+    made = write_report(loaded, output, later)
     say(f"wrote {made}")
     say("open it in a browser; it needs no other file")

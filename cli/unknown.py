@@ -8,7 +8,7 @@ import typer
 from ..core.registry import REGISTRY
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
-from .output import check_output, write_json
+from .output import check_result, write_json
 
 
 def add_to(app: typer.Typer) -> None:
@@ -31,10 +31,11 @@ def unknown(
     For a misfit that no named effect explains. The force is the smoothest one that makes the model follow the
     recordings; the law is the sum of few terms that does the same, checked on held-out recordings.
     """
-    if json_file is not None:
-        check_output(json_file, force=True)
     with ProgressView() as progress:
-        found = REGISTRY.get("step", "unknown")(Study.load(study, workers=workers, progress=progress))
+        loaded = Study.load(study, workers=workers, progress=progress)
+        if json_file is not None:
+            check_result(json_file, ".json", loaded)
+        found = REGISTRY.get("step", "unknown")(loaded)
     say(found.text())
     result = found.to_json()
     if json_file is not None:
