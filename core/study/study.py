@@ -1,6 +1,7 @@
 """The study: one file that names everything, and one store that holds every result."""
 
 import hashlib
+import tempfile
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +13,7 @@ from ..errors import InputError, StepMissingError
 from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
-from ..store import damage_errors, new_store, open_store
+from ..store import damage_errors, new_store, open_store, storage_errors
 from .config import ParameterTable, StudyConfig, read_config, write_config
 from .pool import SimulationPool
 from .problem import Problem, build_problem
@@ -117,6 +118,15 @@ class Study:
         if not self.results_path.exists():
             raise StepMissingError(f"{self.path} has not been fitted yet; run: muslin fit {self.path}")
         return open_store(self.results_path, mode)
+
+    def check_writable(self) -> None:
+        """Refuse results that cannot be written now, and not when the work is done.
+
+        Raises:
+            StoreError: as the write at the end would.
+        """
+        with storage_errors(self.results_path), tempfile.TemporaryFile(dir=self.results_path) as trial:
+            trial.write(b"0")
 
     def step_results(self, step: str) -> zarr.Group:
         """Results of a finished step.

@@ -57,6 +57,7 @@ def calibrate(study: Study, simulations: int = 0, predictive: int = PREDICTIVE) 
         raise InputError('fresh simulations cannot be judged with [estimator] proposal = "gaussian"; leave them out')
     began = time.monotonic()
     group, fit, problem = study.step_results("fit"), load_fit(study), study.problem
+    study.check_writable()
     if group.attrs.get("engine") != problem.simulator.engine_version():
         raise StepMissingError(
             f"{study.path} was fitted with {group.attrs.get('engine')}, but now there is "

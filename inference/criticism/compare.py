@@ -34,6 +34,7 @@ PREDICTIVE = 8
 def compare(study: Study) -> Comparison:
     """Simulate every recording with the best fit, with posterior draws and with the unfitted model."""
     fit, problem = load_fit(study), study.problem
+    study.check_writable()
     fit = replace(fit, noise=fit.noise.normal)
     names = [*problem.fit_on, *problem.hold_out]
     rng = np.random.default_rng([study.config.study.seed, 31])

@@ -32,6 +32,7 @@ def diagnose(study: Study) -> Diagnosis:
     """Refit the model with each candidate effect and say what that shows."""
     began = time.monotonic()
     fit = load_fit(study)
+    study.check_writable()
     names = candidate_names(study)
     effects = {n: REGISTRY.get("effect", n) for n in names}
     problem = replace(study.problem, effects={**study.problem.effects, **effects})

@@ -83,6 +83,7 @@ def propose_next(
     whole = joined(problem.scenarios, problem.cut_from)  # a robot is moved from where a recording starts, not a piece
     limits = limits_within(whole.values(), **asked)
     fit, opening = load_fit(study), opening_of(study, effects)
+    study.check_writable()
     noise = fit.noise
     known = knowing(problem, {n: REGISTRY.get("effect", n) for n in opening.all_effects})
     goal, spent = _goal(study, known, fit, opening)

@@ -46,6 +46,7 @@ class Finding(Told):
 def unknown(study: Study) -> Finding:
     """Estimate the missing force on the fitted recordings, and the law it follows; save both in the study's store."""
     began, fit, problem = time.monotonic(), load_fit(study), study.problem
+    study.check_writable()
     fit = replace(fit, noise=fit.noise.normal)
     for name in problem.fit_on:  # a force in space is not told by pictures of one camera
         check_spatial(problem.recordings[name])
