@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ...core.errors import InputError, MuslinError
+from ...core.errors import InputError, MuslinError, StepMissingError
 from ...core.store import write_text
 from ...core.study.study import Study
 
@@ -15,13 +15,13 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
     Args:
         study: at least fitted.
         output: HTML file; default ``STEM.report.html`` beside the study file.
-        after: the same study with an effect added, whose errors are then shown as "after".
+        after: the same study with an effect added, compared, whose errors are then shown as "after".
 
     Returns:
         Where the report is.
 
     Raises:
-        StepMissingError: the study has not been fitted.
+        StepMissingError: the study has not been fitted, or ``after`` not compared.
         InputError: ``after`` is about other recordings.
     """
     try:
@@ -29,12 +29,24 @@ def write_report(study: Study, output: Path | None = None, after: Study | None =
     except ImportError as error:
         raise missing_extra(error) from error
     path = output or study.path.with_name(f"{study.path.stem}.report.html")
-    if after is not None and after.fingerprint("compare")["measured"] != study.fingerprint("compare")["measured"]:
-        raise InputError(f"{after.path} is about other recordings than {study.path}; --after takes a study made by add")
+    if after is not None:
+        _check_after(study, after)
     page = render(study, after)
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, page)
     return path
+
+
+def _check_after(study: Study, after: Study) -> None:
+    if after.fingerprint("compare")["measured"] != study.fingerprint("compare")["measured"]:
+        raise InputError(f"{after.path} is about other recordings than {study.path}; --after takes a study made by add")
+    try:
+        after.step_results("compare")
+    except StepMissingError as error:
+        raise StepMissingError(
+            f"{after.path} has not been compared, or not since it changed; run: muslin fit {after.path} && "
+            f"muslin compare {after.path}"
+        ) from error
 
 
 def overview_figure(study: Study, after: Study | None = None) -> bytes:

@@ -74,8 +74,21 @@ def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     assert "air drag: drag coefficient" in page.text and "not in the model" in page.text
     assert "muslin add air-drag cloth.toml -o cloth-with-air-drag.toml" in page.text
     assert page.figures["svg"] == 3 + 3 + 1 + 4 + 1
-    unfinished = make_study(tmp_path, "fit", drag=True)
-    assert "is the refit of the diagnosis" in page_of(study, unfinished).text
+
+
+@pytest.mark.parametrize("state", ["compared and changed", "fitted", "empty", "new"])
+def test_an_after_that_has_nothing_to_show_is_refused(tmp_path: Path, state: str) -> None:
+    study = make_study(tmp_path, "fit", "compare", "diagnose")
+    steps = {"compared and changed": ("fit", "compare"), "fitted": ("fit",)}.get(state, ())
+    after = make_study(tmp_path, *steps, drag=True)
+    if steps == ("fit", "compare"):
+        after.config.study.seed += 1
+    if state == "new":
+        after.results_path.rename(tmp_path / "gone.zarr")
+    told = r"has not been compared.* muslin fit \S+drag\.toml && muslin compare"
+    with pytest.raises(StepMissingError, match=told):
+        write_report(study, after=after)
+    assert not list(tmp_path.glob("*.html"))
 
 
 def test_self_contained_and_escaped(tmp_path: Path) -> None:
