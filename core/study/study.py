@@ -9,7 +9,7 @@ from typing import Any
 
 import zarr
 
-from ..errors import InputError, StepMissingError
+from ..errors import InputError, MissingFileError, StepMissingError
 from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
@@ -65,6 +65,11 @@ class Study:
 
     @cached_property
     def measurement(self) -> Measurement:
+        if not self.measurement_path.exists():
+            raise MissingFileError(
+                f"{self.path}, [study] measurement: there is no store at {self.measurement_path}; make it with muslin "
+                "import, or name where it is, as seen from the study file"
+            )
         return load_measurement(self.measurement_path)
 
     @cached_property

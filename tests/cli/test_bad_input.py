@@ -46,6 +46,12 @@ def test_a_missing_file(muslin: Muslin, tmp_path: Path) -> None:
     assert names(tmp_path) == set()
 
 
+def test_a_study_whose_measurement_is_missing(muslin: Muslin, tmp_path: Path, study: Path) -> None:
+    (tmp_path / "m.zarr").rename(tmp_path / "moved.zarr")
+    told = "study.toml, [study] measurement: there is no store at m.zarr"
+    refused(muslin("fit", "study.toml"), told, "muslin import")
+
+
 def test_a_wrong_unit(muslin: Muslin, tmp_path: Path, take: Path) -> None:
     refused(muslin("import", "take.npz", "-o", "out.zarr", "--unit", "inch"), "units are m, cm, mm, px")
     rng = np.random.default_rng(0)
