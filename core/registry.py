@@ -7,6 +7,8 @@ uses the group ``muslin`` instead, with a module that implements the hook of :mo
 """
 
 import difflib
+import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
@@ -170,6 +172,30 @@ def nearest(name: str, known: list[str]) -> str:
     """``' Did you mean ...?'`` if a known name is near, else nothing."""
     close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     return f" Did you mean {close[0]!r}?" if close else ""
+
+
+def check_options(kind: str, name: str, plugin: Any, options: Mapping[str, Any]) -> None:
+    """Refuse options that a plugin does not take, or lacks.
+
+    Args:
+        kind, name: of the plugin, as a study file has them.
+        plugin: what makes it.
+        options: by name.
+
+    Raises:
+        InputError: names the nearest option and all that there are.
+    """
+    parameters = inspect.signature(plugin).parameters.values()
+    known = [p.name for p in parameters if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)]
+    takes = f"Options: {', '.join(known) or 'none'}"
+    open_ended = any(p.kind == p.VAR_KEYWORD for p in parameters)
+    for option in options:
+        if option not in known and not open_ended:
+            raise InputError(f"[{kind}] {name!r} has no option {option!r}.{nearest(option, known)} {takes}")
+    try:
+        inspect.signature(plugin).bind(**options)
+    except TypeError as error:
+        raise InputError(f"[{kind}] {name!r} does not take these options: {error}. {takes}") from error
 
 
 def _unknown(kind: str, name: str, known: list[str]) -> str:

@@ -1,6 +1,5 @@
 """A study resolved to something that can be simulated, small enough to send to worker processes."""
 
-import inspect
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from ..material import Material, with_fields
 from ..measurement import Measurement, Recording
 from ..parameters import ParameterSpace
 from ..powerless import why_powerless
-from ..registry import REGISTRY
+from ..registry import REGISTRY, check_options
 from ..rollout import Trajectory, rollout
 from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
@@ -223,10 +222,7 @@ def _check_start(simulator: Simulator, scenario: Scenario, material: Material, s
 
 def _plugin(kind: str, name: str, options: dict[str, Any]) -> Any:
     plugin = REGISTRY.get(kind, name)
-    try:
-        inspect.signature(plugin).bind(**options)
-    except TypeError as error:
-        raise InputError(f"[{kind}] {name!r} does not take these options: {error}") from error
+    check_options(kind, name, plugin, options)
     try:
         return plugin(**options)
     except (TypeError, ValueError) as error:

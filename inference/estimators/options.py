@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from ...core.errors import InputError
+from ...core.registry import nearest
 
 T = TypeVar("T")
 
@@ -33,7 +34,8 @@ def with_options(
     known = [f.name for f in fields(base)]  # type: ignore[arg-type]
     for option, value in options.items():
         if option not in known:
-            raise InputError(f"{name} has no option {option!r}; it has {', '.join(['preset', *known])}")
+            near, all_of_them = nearest(option, ["preset", *known]), ", ".join(["preset", *known])
+            raise InputError(f"{name} has no option {option!r}.{near} Options: {all_of_them}")
         checked = _checked(name, option, value, getattr(base, option), option in may_be_zero)
         base = replace(base, **{option: checked})  # type: ignore[type-var]
     return base

@@ -3,7 +3,7 @@
 from ...core.arrays import FloatArray, IntArray
 from ...core.errors import InputError
 from ...core.estimator import Posterior, PosteriorEstimator
-from ...core.registry import REGISTRY
+from ...core.registry import REGISTRY, check_options
 from ...core.study import Study
 from ..calibration.warn import calibration_warnings
 from .proposals import Proposals
@@ -24,8 +24,10 @@ def make_estimator(study: Study, correspondence: list[bool]) -> PosteriorEstimat
     options = dict(table.options)
     if not all(correspondence):
         options.setdefault("correspondence", False)
+    plugin = REGISTRY.get("estimator", table.name)
+    check_options("estimator", table.name, plugin, options)
     try:
-        made: PosteriorEstimator = REGISTRY.get("estimator", table.name)(**options)
+        made: PosteriorEstimator = plugin(**options)
     except TypeError as error:
         raise InputError(f"[estimator] {table.name!r} does not take these options: {error}") from error
     return made

@@ -127,7 +127,10 @@ def test_what_the_mesh_does_not_have() -> None:
 
 def test_plugins_and_their_options() -> None:
     assert "Did you mean 'reference'" in complaint(simulator={"name": "refernce"})
-    assert "does not take these options" in complaint(simulator={"name": "reference", "colour": "red"})
+    wrong = complaint(simulator={"name": "reference", "time_stp": 0.01})
+    assert "[simulator] 'reference' has no option 'time_stp'. Did you mean 'time_step'? Options: time_step" in wrong
+    wrong = complaint(extractor={"name": "markers", "colour": "red"})
+    assert "[extractor] 'markers' has no option 'colour'. Options: none" in wrong
 
 
 def test_points_that_cannot_be_compared() -> None:

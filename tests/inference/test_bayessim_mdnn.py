@@ -96,7 +96,13 @@ def test_the_papers_preset_has_its_settings_and_runs() -> None:
     kit.check_normalised(short.posterior([x[0][0]]), 2)
 
 
-@pytest.mark.parametrize(("options", "message"), [({"on": "frames"}, "trajectory"), ({"member": 3}, "no option")])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"on": "frames"}, "trajectory"),
+        ({"member": 3}, r"no option 'member'\. Did you mean 'members'\? Options: preset, "),
+    ],
+)
 def test_options_that_make_no_sense_are_refused(options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         BayesSimMDNN(**options)  # type: ignore[arg-type]

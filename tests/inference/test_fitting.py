@@ -17,6 +17,7 @@ from small import TRUTH, small_measurement, write_study
 from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreError
 from muslin.core.measurement import Measurement
 from muslin.core.measurement_store import save_measurement
+from muslin.core.registry import REGISTRY
 from muslin.core.store import read
 from muslin.core.study import Study, read_config, write_config
 from muslin.inference.criticism import compare as comparing
@@ -195,10 +196,16 @@ def test_results_of_an_earlier_state_of_the_study_are_not_used(small_study: Stud
         Study(changed.config, changed.path, workers=1).compare()
 
 
-def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(small_study: Study) -> None:
+def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(
+    small_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
     config = small_study.config.model_copy(deep=True)
     config.estimator = config.estimator.model_validate({"name": "bayessim-rkhs", "no_such_option": 1})
     with pytest.raises(InputError, match="no_such_option"):
+        Study(config, small_study.path, workers=1).fit()
+    monkeypatch.setitem(REGISTRY._objects, ("estimator", "own"), lambda *, width=3, correspondence=True: None)
+    config.estimator = config.estimator.model_validate({"name": "own", "widht": 1})
+    with pytest.raises(InputError, match=r"'own' has no option 'widht'\. Did you mean 'width'\? Options: width, corr"):
         Study(config, small_study.path, workers=1).fit()
     assert not small_study.results_path.exists()
 
