@@ -72,13 +72,31 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
     if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
         return replace(plan, markers="surface"), [f"the {count} points are a cloud, held against the whole surface"]
-    if plan.markers is None and (not followed or count == len(body.vertices)):
+    if plan.markers is None and not followed:
         return replace(plan, markers="all"), []
-    if plan.markers is None and body.kind == "solid":
+    if plan.markers is None and body.kind == "solid" and count != len(body.vertices):
         return replace(plan, markers="bound"), [
             f"the {count} points are tied to the object where they are in the first frame"
         ]
+    check_alike(plan, measured)
+    if plan.markers is None and count == len(body.vertices):
+        return replace(plan, markers="all"), []
     return _on_nearest(plan, measured, study, count)
+
+
+def check_alike(plan: Plan, measured: Measurement) -> None:
+    """Refuse recordings that differ in how many points they have, where point by point is to have its vertex."""
+    having: dict[int, list[str]] = {}
+    for name in (*plan.fit_on, *plan.hold_out):
+        having.setdefault(measured[name].series.points.shape[1], []).append(name)
+    if plan.points is not None or len(having) == 1:
+        return
+    told = "; ".join(f"{', '.join(names)}: {count}" for count, names in having.items())
+    alike = max(having.values(), key=len)
+    raise InputError(
+        f"the recordings differ in how many points they have ({told}), and a point must be the same in all; take those "
+        f"that are alike (--fit-on {','.join(alike)}), or the points that all have (--points I,J, numbered from 0)"
+    )
 
 
 def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:

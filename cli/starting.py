@@ -22,7 +22,7 @@ from ..core.study.objects import grasps_of, keep_points, object_of
 from .console import command, next_step, say
 from .gridding import Grid, laid_over, seen_grid
 from .output import check_output
-from .placing import doubtful_starts, parse_markers, place_markers
+from .placing import check_alike, doubtful_starts, parse_markers, place_markers
 from .study_file import study_text
 from .study_plan import Plan
 
@@ -159,6 +159,8 @@ def new(
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
     elif grid is None:
         plan = replace(plan, markers="all")
+    else:
+        check_alike(plan, measured)
     text = study_text(plan)
     problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
     remarks += doubtful_starts(problem)

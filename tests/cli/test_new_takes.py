@@ -1,9 +1,11 @@
 """Which takes ``muslin new`` chooses where nobody says, and how it says so."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from running import cloth_measurement
 
 from muslin.cli import main
 from muslin.core.measurement import Measurement, Recording
@@ -63,3 +65,20 @@ def test_who_says_one_of_them_is_asked_no_more(
     assert "chosen of" not in capsys.readouterr().out
     study = read_config(path).study
     assert study.fit_on == fitted and study.hold_out == held_out
+
+
+@pytest.mark.parametrize("option", [(), ("--vertices", "3,3"), ("--vertices", "5,5"), ("--hold-out", "two")])
+def test_takes_that_differ_in_how_many_points_they_have_are_told_apart(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: tuple[str, ...]
+) -> None:
+    pytest.importorskip("mujoco")
+    one, two = cloth_measurement().recordings
+    two = replace(two, series=replace(two.series, points=two.series.points[:, :8]))
+    save_measurement(Measurement((one, two, replace(one, name="three"))), tmp_path / "m.zarr")
+    new = ("new", tmp_path / "s.toml", "--measurement", tmp_path / "m.zarr", "--scenario", "fling")
+    assert status(*new, *option) == 2
+    said = capsys.readouterr().err
+    assert "one, three: 9" in said and "two: 8" in said and "[scenario" not in said
+    assert "--fit-on one,three" in said and "--points I,J" in said and not (tmp_path / "s.toml").exists()
+    assert status(*new, "--fit-on", "one,three") == 0
+    assert status(*new, "--force", "--points", "0,2,4,6") == 0
