@@ -103,9 +103,12 @@ def test_without_a_misfit_nothing_is_sought(tmp_path: Path) -> None:
 def test_a_hidden_law_is_found_and_added(tmp_path: Path, monkeypatch, push, terms) -> None:
     """The force explains the misfit, the law has the right terms and numbers, and a study carries it."""
     monkeypatch.setattr(step, "FUNCTIONS", 60)
-    study = fitted_study(tmp_path, push)
+    study, heard = fitted_study(tmp_path, push), []
+    study.progress = lambda text, done, total: heard.append((text, total))
     found = step.unknown(study)
     result = found.result
+    assert {("following recording 'near'", 12), ("asking what is chance", 0)} <= set(heard)
+    assert max(total for text, total in heard if text == "estimating the missing force") > 20
     check_json(result)
     assert result["force"]["explained"] > 0.9
     assert result["verdict"] in ("law", "tied")

@@ -1,6 +1,6 @@
 """What is not known, parameters and forces together: their residuals, sensitivities, and what became of them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,13 +124,20 @@ class ForceObjective:
         pool, unknowns: where rollouts run, and what they are a function of.
         noise, offsets: of the measurement.
         discrepancy: what the model cannot repeat, which no force should explain.
+        progress: told of rollouts done, and of how many there are, of the sensitivities of one recording.
     """
 
     def __init__(
-        self, pool: SimulationPool, unknowns: Unknowns, noise: Noise, offsets: Offsets, discrepancy: Discrepancy
+        self,
+        pool: SimulationPool,
+        unknowns: Unknowns,
+        noise: Noise,
+        offsets: Offsets,
+        discrepancy: Discrepancy,
+        progress: Callable[[int, int], None],
     ) -> None:
         self.pool, self.unknowns, self.noise, self.offsets = pool, unknowns, noise, offsets
-        self.discrepancy = discrepancy
+        self.discrepancy, self.progress = discrepancy, progress
         self.recordings = [pool.problem.recordings[n] for n in unknowns.recordings]
 
     def look(self, points: Sequence[FloatArray]) -> list[tuple[list[FloatArray], list[FloatArray]] | None]:
@@ -162,7 +169,8 @@ class ForceObjective:
                     steps[k] = step
                 made = self.pool.map([Task(u.values(point + s, r), name) for s in steps.values()])
                 failed = []
-                for k, m in zip(own, made, strict=True):
+                for done, (k, m) in enumerate(zip(own, made, strict=True)):
+                    self.progress(done + 1, len(own))
                     moved = self._or_none(self.recordings[r], m)
                     if moved is None:
                         failed.append(k)

@@ -1,6 +1,6 @@
 """A first force: pull the model along what was measured, and learn from the pull (iterative learning control)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -61,7 +61,14 @@ def velocities_of(times: FloatArray, vertices: FloatArray) -> FloatArray:
 
 
 def follow(
-    pool: SimulationPool, recording: str, effect: str, basis: Basis, aim: Aim, values: Mapping[str, float], noise: float
+    pool: SimulationPool,
+    recording: str,
+    effect: str,
+    basis: Basis,
+    aim: Aim,
+    values: Mapping[str, float],
+    noise: float,
+    progress: Callable[[int, int], None],
 ) -> tuple[FloatArray, float]:
     """Learn the force along which the model follows one recording.
 
@@ -75,14 +82,16 @@ def follow(
         basis, aim: of the force.
         values: of all other parameters.
         noise: standard deviation [m].
+        progress: told of lessons done, and of how many there are at most.
 
     Returns:
         Coefficients ``(K,)`` [m/s2] and the pull [rad/s]; zeros if the model cannot be pulled.
     """
     best: tuple[float, FloatArray, float] = (np.inf, np.zeros(len(basis)), 0.0)
-    for rate in PULLS:
+    for k, rate in enumerate(PULLS):
         force = np.zeros(len(basis))
-        for _ in range(LESSONS):
+        for lesson in range(LESSONS):
+            progress(k * LESSONS + lesson, len(PULLS) * LESSONS)
             task = Task({**values, **named(effect, force), f"{effect}.{PULL}": rate}, recording)
             (made,) = pool.map([task])
             if not isinstance(made, Trajectory):

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -51,6 +52,7 @@ def unknown(study: Study) -> Finding:
     for name in problem.fit_on:  # a force in space is not told by pictures of one camera
         check_spatial(problem.recordings[name])
     offsets, unit = offsets_of(study), read(study.step_results("fit"), "estimate_unit")
+    study.progress("asking what is chance", 0, 0)
     with study.pool(problem) as pool:
         rough = roughness(pool, problem.space, unit, problem.fit_on)
         discrepancy = rough.discrepancy(problem.recordings, fit.noise, offsets)
@@ -141,15 +143,17 @@ def _objective(
     """Residuals of a model that is pulled as little as it must be, and starts: no force, and a first one."""
     unit = study.problem.space.to_unit(fit.estimate)
     values = fit.values()
-    study.progress("following the recordings", 0, 0)
     learned = [
-        (np.zeros(len(b)), 0.0) if a is None else follow(pool, n, e, b, a, values, fit.noise.sd)
+        (np.zeros(len(b)), 0.0)
+        if a is None
+        else follow(pool, n, e, b, a, values, fit.noise.sd, partial(study.progress, f"following recording {n!r}"))
         for n, e, b, a in zip(unknowns.recordings, unknowns.effects, unknowns.bases, aims, strict=True)
     ]
     unknowns = replace(unknowns, pulls=tuple(pull for _, pull in learned))
     none = np.concatenate([unit, np.zeros(sum(map(len, unknowns.bases)))])
     starts = [none, np.concatenate([unit, *(force for force, _ in learned)])]
-    return ForceObjective(pool, unknowns, fit.noise, offsets, discrepancy), starts
+    progress = partial(study.progress, "estimating the missing force")
+    return ForceObjective(pool, unknowns, fit.noise, offsets, discrepancy, progress), starts
 
 
 def _law(
