@@ -11,7 +11,7 @@ from .errors import InputError
 from .measurement import Measurement, Recording
 from .motion import Motion
 from .series import PointSeries, PointUnit
-from .store import new_store, open_store, put, read, subgroup
+from .store import damage, new_store, open_store, put, subgroup, values
 
 _AXES = ("x", "y", "z")
 
@@ -62,7 +62,7 @@ def read_gripper(group: zarr.Group) -> Motion | None:
     """The gripper poses of one recording, or None where nothing moved."""
     if "gripper_pose" not in group:
         return None
-    return Motion(read(group, "gripper_time"), read(group, "gripper_pose"))
+    return Motion(values(group, "gripper_time"), values(group, "gripper_pose"))
 
 
 def load_measurement(path: Path) -> Measurement:
@@ -94,7 +94,7 @@ def _recording(root: zarr.Group, name: str, path: Path) -> Recording:
     try:
         group = subgroup(root, name)
         unit = cast(PointUnit, str(group["points"].attrs["units"]))
-        series = PointSeries(read(group, "time"), read(group, "points"), unit, bool(group.attrs["correspondence"]))
+        series = PointSeries(values(group, "time"), values(group, "points"), unit, bool(group.attrs["correspondence"]))
         table = cast(dict[str, Any] | None, group.attrs.get("camera"))
         camera = None if table is None else Camera.from_table(table)
         load = float(cast(float, group.attrs["load_kg"]))
@@ -102,5 +102,4 @@ def _recording(root: zarr.Group, name: str, path: Path) -> Recording:
     except InputError as error:
         raise InputError(f"{path}, recording {name!r}: {error}") from error
     except Exception as error:  # what zarr raises on a damaged store depends on what is damaged
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise InputError(f"{path}, recording {name!r} is damaged ({reason}); import it again") from error
+        raise InputError(f"{path}, recording {name!r} is damaged ({damage(error)}); import it again") from error

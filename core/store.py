@@ -8,7 +8,7 @@ import contextlib
 import errno
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,13 @@ import zarr
 from .errors import InputError, MissingFileError, MuslinError, StoreError
 
 FORMAT = 1
+#: Set on arrays of which every chunk was written, those that hold nothing but the fill value, too. Older ones may lack
+#: such chunks.
+_COMPLETE = "all_chunks_written"
+
+
+class _Lacking(Exception):
+    """What a store lacks, in words."""
 
 
 @contextlib.contextmanager
@@ -94,16 +101,27 @@ def open_store(path: Path, mode: str = "r") -> zarr.Group:
     return root
 
 
+def damage(error: Exception) -> str:
+    """What is wrong with a store, in one line, from what was raised as it was read."""
+    return str(error) if isinstance(error, _Lacking) else f"{type(error).__name__}: {error}".splitlines()[0]
+
+
 @contextlib.contextmanager
-def damage_errors(path: Path) -> Iterator[None]:
-    """Turn what zarr raises on a damaged store into one clear :class:`StoreError`."""
+def damage_errors(path: Path, which: str = "") -> Iterator[None]:
+    """Turn what zarr raises on a damaged store of results into one clear :class:`StoreError`.
+
+    Args:
+        path: of the store.
+        which: part of it is read.
+    """
     try:
         yield
     except MuslinError:
         raise
-    except (OSError, ValueError, KeyError, RuntimeError, TypeError, AttributeError) as error:
+    except (_Lacking, OSError, ValueError, KeyError, RuntimeError, TypeError, AttributeError) as error:
+        place = f", {which}," if which else ""
         raise StoreError(
-            f"{path} is damaged ({type(error).__name__}: {error}); move it away and run the fit again"
+            f"{path}{place} is damaged ({damage(error)}); move the store away and run the fit again"
         ) from error
 
 
@@ -124,9 +142,26 @@ def put(
         chunks=tuple(max(1, n) for n in values.shape),
         dimension_names=tuple(dims),
         overwrite=True,
-        attributes={"units": unit, "long_name": description or name, **attributes},
+        attributes={"units": unit, "long_name": description or name, _COMPLETE: 1, **attributes},
+        config={"write_empty_chunks": True},
     )
     return array
+
+
+def put_frames(
+    group: zarr.Group, name: str, data: npt.NDArray[Any], dims: Sequence[str], unit: str, description: str
+) -> None:
+    """Write a new array with one chunk a frame (first axis)."""
+    array = group.create_array(
+        name,
+        shape=data.shape,
+        dtype=data.dtype,
+        chunks=(1, *data.shape[1:]),
+        dimension_names=tuple(dims),
+        attributes={"units": unit, "long_name": description, _COMPLETE: 1},
+        config={"write_empty_chunks": True},
+    )
+    array[...] = np.ascontiguousarray(data)
 
 
 def empty_draws(
@@ -154,10 +189,33 @@ def subgroup(group: zarr.Group, name: str) -> zarr.Group:
 
 
 def read(group: zarr.Group, name: str) -> npt.NDArray[Any]:
-    """One whole array; :class:`StoreError` if there is none of that name, or it cannot be read."""
-    path = Path(str(group.store_path).removeprefix("file:"))
-    with damage_errors(path):
-        array = group.get(name)
-        if not isinstance(array, zarr.Array):
-            raise StoreError(f"{path} has no array {name!r}; move the store away and run the fit again")
-        return np.asarray(array[...])
+    """One whole array of results; :class:`StoreError` if there is none of that name, or it cannot be read."""
+    store = str(group.store_path.store).removeprefix("file://")
+    with damage_errors(Path(store), f"{group.path}/{name}".removeprefix("/")):
+        return values(group, name)
+
+
+def values(group: zarr.Group, name: str) -> npt.NDArray[Any]:
+    """One whole array; on a damaged store whatever zarr raises, which :func:`damage` puts in words."""
+    array = group.get(name)
+    if not isinstance(array, zarr.Array):
+        raise _Lacking(f"it has no array {name!r}")
+    _check_chunks(array, np.ndindex(*array.cdata_shape))
+    return np.asarray(array[...])
+
+
+def frame_of(array: zarr.Array[Any], number: int) -> npt.NDArray[Any]:
+    """Entry ``number`` of the first axis of an array with one chunk a frame; raises as :func:`values`."""
+    _check_chunks(array, [(range(array.shape[0])[number], *(0 for _ in array.shape[1:]))])
+    return np.asarray(array[number])
+
+
+def _check_chunks(array: zarr.Array[Any], chunks: Iterable[tuple[int, ...]]) -> None:
+    """A chunk that is gone is damage, though zarr takes it for fill values. Looked up one by one: listing is slower."""
+    if not array.attrs.get(_COMPLETE):
+        return
+    folder = str(array.store_path).removeprefix("file://")
+    for chunk in chunks:
+        key = array.metadata.encode_chunk_key(chunk)
+        if not os.path.exists(f"{folder}/{key}"):
+            raise _Lacking(f"{array.basename}/{key} is missing")

@@ -9,11 +9,12 @@ from typing import Any, cast
 import numpy as np
 import zarr
 
+from .arrays import FloatArray
 from .camera import Camera
 from .errors import InputError, MissingFileError, MuslinError, StoreError
 from .frames import Frames
 from .picture import Image
-from .store import open_store, read, subgroup
+from .store import damage, frame_of, open_store, subgroup, values
 
 
 @contextlib.contextmanager
@@ -23,8 +24,7 @@ def _damage(path: Path) -> Iterator[None]:
     except MuslinError:
         raise
     except Exception as error:  # what zarr raises on a damaged store depends on what is damaged
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise StoreError(f"{path} is damaged ({reason}); import it again") from error
+        raise StoreError(f"{path} is damaged ({damage(error)}); import it again") from error
 
 
 class VideoFrames:
@@ -76,13 +76,17 @@ class VideoFrames:
 
     def time(self, recording: str) -> float:
         """From the first to the last frame of a take [s]."""
-        times = read(self._groups[recording], "time")
+        times = self._times(recording)
         return float(times[-1] - times[0])
+
+    def _times(self, recording: str) -> FloatArray:
+        with _damage(self.path):
+            return values(self._groups[recording], "time")
 
     def rgb(self, recording: str, number: int) -> Image:
         """One picture ``(H, W, 3)``."""
         with _damage(self.path):
-            return np.asarray(self._rgb[recording][number], np.uint8)
+            return frame_of(self._rgb[recording], number).astype(np.uint8, copy=False)
 
     def some(self, recording: str, numbers: Sequence[int]) -> Frames:
         """Some frames of a take with all their layers, in that order; at least one."""
@@ -90,7 +94,7 @@ class VideoFrames:
         with _damage(self.path):
             table = cast(dict[str, Any] | None, group.attrs.get("camera"))
             layers = [
-                np.stack([np.asarray(array[k]) for k in numbers]) if isinstance(array, zarr.Array) else None
+                np.stack([frame_of(array, k) for k in numbers]) if isinstance(array, zarr.Array) else None
                 for array in (group.get(name) for name in ("rgb", "depth", "robot"))
             ]
         rgb, depth, robot = layers
@@ -99,6 +103,6 @@ class VideoFrames:
     def fingerprint(self, recording: str) -> str:
         """Tells a take from others, whatever its name: 16 hexadecimal digits of its size, times and first picture."""
         digest = hashlib.sha256(repr(self._rgb[recording].shape).encode())
-        digest.update(np.ascontiguousarray(read(self._groups[recording], "time"), "<f8").tobytes())
+        digest.update(np.ascontiguousarray(self._times(recording), "<f8").tobytes())
         digest.update(np.ascontiguousarray(self.rgb(recording, 0)).tobytes())
         return digest.hexdigest()[:16]

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import numpy.typing as npt
 import zarr
 
@@ -12,7 +11,7 @@ from .camera import Camera
 from .errors import InputError
 from .frames import Frames, Video
 from .measurement_store import put_gripper, read_gripper
-from .store import new_store, open_store, put, read, subgroup
+from .store import damage, new_store, open_store, put, put_frames, subgroup, values
 
 
 def save_videos(videos: Sequence[Video], path: Path, *, overwrite: bool = False) -> None:
@@ -55,28 +54,18 @@ def _video(root: zarr.Group, name: str, path: Path) -> Video:
         group = subgroup(root, name)
         table = cast(dict[str, Any] | None, group.attrs.get("camera"))
         frames = Frames(
-            read(group, "rgb"),
-            read(group, "depth") if "depth" in group else None,
-            read(group, "robot") if "robot" in group else None,
+            values(group, "rgb"),
+            values(group, "depth") if "depth" in group else None,
+            values(group, "robot") if "robot" in group else None,
             None if table is None else Camera.from_table(table),
         )
         load = float(cast(float, group.attrs["load_kg"]))
-        return Video(name, read(group, "time"), frames, read_gripper(group), str(group.attrs["motion"]), load)
+        return Video(name, values(group, "time"), frames, read_gripper(group), str(group.attrs["motion"]), load)
     except InputError as error:
         raise InputError(f"{path}, video {name!r}: {error}") from error
     except Exception as error:  # what zarr raises on a damaged store depends on what is damaged
-        reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise InputError(f"{path}, video {name!r} is damaged ({reason}); import it again") from error
+        raise InputError(f"{path}, video {name!r} is damaged ({damage(error)}); import it again") from error
 
 
 def _put_pictures(group: zarr.Group, name: str, data: npt.NDArray[Any], unit: str, description: str) -> None:
-    dims = ("time", "row", "column", "channel")[: data.ndim]
-    array = group.create_array(
-        name,
-        shape=data.shape,
-        dtype=data.dtype,
-        chunks=(1, *data.shape[1:]),
-        dimension_names=dims,
-        attributes={"units": unit, "long_name": description},
-    )
-    array[...] = np.ascontiguousarray(data)
+    put_frames(group, name, data, ("time", "row", "column", "channel")[: data.ndim], unit, description)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from muslin.core.camera import Camera
-from muslin.core.errors import InputError
+from muslin.core.errors import InputError, StoreError
 from muslin.core.frames import Frames, Video
 from muslin.core.motion import Motion
+from muslin.core.video_frames import VideoFrames
 from muslin.core.video_store import load_videos, save_videos
 
 CAMERA = Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
@@ -70,3 +71,16 @@ def test_another_store_is_no_video(tmp_path: Path) -> None:
     (tmp_path / "v.zarr" / "a" / "rgb" / "zarr.json").write_text("{}")
     with pytest.raises(InputError, match="damaged"):
         load_videos(tmp_path / "v.zarr")
+
+
+def test_a_frame_that_is_gone_is_damage_and_not_black(tmp_path: Path) -> None:
+    path, dark = tmp_path / "v.zarr", Frames(np.zeros((4, 24, 32, 3), np.uint8))
+    save_videos([Video("a", np.arange(4) / 30.0, dark)], path)
+    assert not VideoFrames(path).rgb("a", 2).any()
+    (path / "a" / "rgb" / "c" / "2" / "0" / "0" / "0").unlink()
+    for read in (lambda: VideoFrames(path).rgb("a", 2), lambda: VideoFrames(path).some("a", [0, 2])):
+        with pytest.raises(StoreError, match=r"damaged \(rgb/c/2/0/0/0 is missing\); import it again"):
+            read()
+    assert not VideoFrames(path).rgb("a", 1).any()
+    with pytest.raises(InputError, match="is missing"):
+        load_videos(path)

@@ -1,4 +1,5 @@
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -135,3 +136,16 @@ def test_a_damaged_store_is_told(tmp_path: Path) -> None:
                 load_measurement(broken)
             assert "broken.zarr" in str(caught.value), (file, damage)
             shutil.rmtree(broken)
+
+
+@pytest.mark.parametrize("spoil", [lambda c: c.unlink(), lambda c: c.write_bytes(c.read_bytes()[:5])])
+def test_damage_is_told_with_one_cause_and_one_next_step(tmp_path: Path, spoil: Callable[[Path], object]) -> None:
+    path = tmp_path / "m.zarr"
+    save_measurement(Measurement((take(),)), path)
+    spoil(path / "a" / "points" / "c" / "0" / "0" / "0")
+    with pytest.raises(InputError) as caught:
+        load_measurement(path)
+    told = str(caught.value)
+    assert told.startswith(f"{path}, recording 'a' is damaged (")
+    assert told.endswith("); import it again")
+    assert told.count("damaged") == 1 and "run the fit" not in told

@@ -1,4 +1,5 @@
 import errno
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -74,3 +75,29 @@ def test_the_operating_system_is_translated(number: int) -> None:
     words = {errno.ENOSPC: "full", errno.EDQUOT: "quota", errno.EACCES: "permission", errno.EROFS: "read-only"}
     with pytest.raises(StoreError, match=words[number]), storage_errors(Path("out.zarr")):
         raise OSError(number, "no")
+
+
+def zeros(path: Path) -> Path:
+    """A store of an array that holds nothing but the value that zarr takes for what is missing."""
+    with new_store(path) as root:
+        put(root.create_group("fit"), "x", np.zeros((3, 2)), ["n", "m"])
+    return path
+
+
+def test_a_chunk_that_is_gone_is_damage_and_not_zeros(tmp_path: Path) -> None:
+    path = zeros(tmp_path / "a.zarr")
+    assert not read(open_store(path), "fit/x").any()
+    chunk = path / "fit" / "x" / "c" / "0" / "0"
+    chunk.unlink()
+    with pytest.raises(StoreError) as caught:
+        read(subgroup(open_store(path), "fit"), "x")
+    told = f"{path}, fit/x, is damaged (x/c/0/0 is missing); move the store away and run the fit again"
+    assert str(caught.value) == told
+
+
+def test_a_store_that_does_not_say_that_all_chunks_were_written_may_lack_some(tmp_path: Path) -> None:
+    path = zeros(tmp_path / "a.zarr")
+    shutil.rmtree(path / "fit" / "x" / "c")
+    array = open_store(path, "r+")["fit/x"]
+    del array.attrs["all_chunks_written"]
+    assert not read(open_store(path), "fit/x").any()
