@@ -1,7 +1,8 @@
 """``muslin import``: files of other programs to one measurement."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -156,7 +157,8 @@ def import_files(
 ) -> None:
     """Import recorded points or videos: several files become several recordings of one store.
 
-    C3D: labelled markers, in the unit that the file names.
+    C3D: labelled markers, in the unit that the file names. In all formats a point that jumps to exactly 0, 0, 0 was
+    not seen.
 
     NPZ: time (T,) in s; points (T, P, 2 or 3) in m or px, NaN where not seen; optionally correspondence,
     gripper_pose (T, G, 3 or 7) as x y z and quaternion w x y z, gripper_time, recording, motion, load in kg, unit.
@@ -211,11 +213,25 @@ def _of_files(
     files: Sequence[Path], options: ImportOptions, each: Mapping[str, Sequence[Any] | None]
 ) -> list[Recording]:
     """What the files hold; ``each`` are options that are given once, or once a file."""
-    return [
-        r
-        for file, own in zip(files, per_file(each, len(files)), strict=True)
-        for r in import_file(file, replace(options, **own))
-    ]
+    with _notes_said():
+        return [
+            r
+            for file, own in zip(files, per_file(each, len(files)), strict=True)
+            for r in import_file(file, replace(options, **own))
+        ]
+
+
+@contextmanager
+def _notes_said() -> Iterator[None]:
+    """Say what readers left out or put right; other warnings go on."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", DatasetNote)
+        yield
+    for warning in caught:
+        if issubclass(warning.category, DatasetNote):
+            say(str(warning.message))
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
 
 
 def _of_dataset(
@@ -231,14 +247,8 @@ def _of_dataset(
     wanted = [part.strip() for take in takes for part in take.split(",") if part.strip()]
     if takes and not wanted:
         raise InputError("--take names no take; write --take A,B,C, or leave it out to read all")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", DatasetNote)
+    with _notes_said():
         recordings = read(files[0], wanted)
-    for warning in caught:
-        if issubclass(warning.category, DatasetNote):
-            say(str(warning.message))
-        else:
-            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     starts = once_or_each(start, len(recordings), "--start", "take")
     stops = once_or_each(stop, len(recordings), "--stop", "take")
     return [cropped(r, a, b) for r, a, b in zip(recordings, starts, stops, strict=True)]

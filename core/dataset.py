@@ -40,7 +40,7 @@ class Dataset(Protocol):
 
 
 class DatasetNote(UserWarning):
-    """What a reader left out or put right in a take."""
+    """What a reader of a set or a file left out or put right in a take."""
 
 
 def note(text: str) -> None:

@@ -1,10 +1,12 @@
 """From a file to recordings: choose the reader, then put units, axes and names right."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ..dataset import note
 from ..errors import InputError, MissingFileError
 from ..lens import Lens
 from ..measurement import Recording
@@ -18,13 +20,14 @@ from .npz import read_npz
 from .options import ImportOptions
 from .raw import RawTake
 from .units import to_si, unit_named
+from .zeros import unseen_zeros
 
 #: Suffix -> reader.
 FORMATS: dict[str, Callable[[Path], list[RawTake]]] = {".npz": read_npz, ".c3d": read_c3d, ".csv": read_csv}
 
 
 def import_file(path: Path, options: ImportOptions | None = None) -> list[Recording]:
-    """Recordings of one file; only a CSV can hold several.
+    """Recordings of one file; only a CSV can hold several. What is taken as not seen is said with a warning.
 
     Args:
         path: of the file; its suffix says the format.
@@ -62,20 +65,22 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
     where = f"{path}, recording {name!r}" if take.name else str(path)
     unit = unit_named(options.unit or take.unit or "m", str(path) if not options.unit else "--unit")
     gripper = _gripper(take, path, options, name, unit)
+    told = [c for c in (options.correspondence, take.correspondence) if c is not None]
+    correspondence = told[0] if told else True
+    take = _without_zeros(take, correspondence, where)
     take = _cropped(take, options, where)
     points, si = to_si(take.points, unit, where)
     points = turned(points, options.up, where)
     lens = None if options.camera is None else Lens.load(options.camera)
     if lens is not None and si == "px" and points.shape[2] == 2:
         points = lens.undistorted_points(points)
-    told = [c for c in (options.correspondence, take.correspondence) if c is not None]
     if gripper is not None and (gripper.times[-1] < take.time[0] or gripper.times[0] > take.time[-1]):
         raise InputError(
             f"{where}: the gripper poses go from {gripper.times[0]:g} to {gripper.times[-1]:g} s, the points from "
             f"{take.time[0]:g} to {take.time[-1]:g} s; give both on the same clock"
         )
     try:
-        series = PointSeries(take.time, points, si, told[0] if told else True)
+        series = PointSeries(take.time, points, si, correspondence)
         if not series.valid.any():  # a file that lacks a coordinate throughout has its columns mixed up
             raise InputError("every point is NaN in every frame; check the columns and the marker labels")
         load = options.load if options.load is not None else (take.load or 0.0)
@@ -94,6 +99,17 @@ def _gripper(take: RawTake, path: Path, options: ImportOptions, name: str, unit:
     return None
 
 
+def _without_zeros(take: RawTake, correspondence: bool, where: str) -> RawTake:
+    """The take without what stands for a point that was not seen."""
+    lost = unseen_zeros(take.points, correspondence)
+    if not lost.any():
+        return take
+    zeros = ", ".join("0" * take.points.shape[2])
+    why = "which is far from where the same points are before or after" if correspondence else "more than one a frame"
+    note(f"{where}: {lost.sum()} observations at exactly {zeros}, {why}, are taken as not seen (NaN)")
+    return replace(take, points=np.where(lost[..., None], np.nan, take.points))
+
+
 def _cropped(take: RawTake, options: ImportOptions, where: str) -> RawTake:
     """Only the frames from start to stop; the clock is not shifted, gripper poses share it."""
     low = -np.inf if options.start is None else options.start
@@ -108,13 +124,4 @@ def _cropped(take: RawTake, options: ImportOptions, where: str) -> RawTake:
             f"{where}: fewer than 2 frames lie between {low:g} and {high:g} s; "
             f"the file goes from {np.nanmin(take.time):g} to {np.nanmax(take.time):g} s"
         )
-    return RawTake(
-        take.time[keep],
-        take.points[keep],
-        take.unit,
-        take.correspondence,
-        take.name,
-        take.motion,
-        take.load,
-        take.gripper,
-    )
+    return replace(take, time=take.time[keep], points=take.points[keep])
