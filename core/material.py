@@ -174,6 +174,23 @@ UNITS: dict[str, dict[str, str]] = {
     "solid": {"density": "kg/m3", "youngs_modulus": "Pa", "poisson_ratio": "1", **_SHARED_UNITS},
 }
 
+#: Between what and what a field lies whatever the object, and how a number in a unit that is usual elsewhere reads.
+_LIMITS = {
+    "areal_density": (0.0, 20.0, "150 g/m2 are 0.15"),
+    "linear_density": (0.0, 20.0, "50 g/m are 0.05"),
+    "density": (3.0, 3e4, "1.07 g/cm3 are 1070"),
+    "diameter": (0.0, 0.5, "8 mm are 0.008"),
+}
+
+
+def check_meant(kind: str, name: str, value: float) -> None:
+    """Raise :class:`InputError` if no object of this ``kind`` has such a value, which is then in another unit."""
+    low, high, other = _LIMITS.get(name, (-float("inf"), float("inf"), ""))
+    if not low <= value <= high:
+        raise InputError(
+            f"{name} is in {UNITS[kind][name]} and must lie between {low:g} and {high:g}, but is {value:g}; {other}"
+        )
+
 
 M = TypeVar("M", bound=ClothMaterial | RopeMaterial | SolidMaterial)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from ..errors import InputError, MissingFileError
 from ..registry import nearest
@@ -37,6 +37,13 @@ class StudyTable(StrictTable):
     seed: int = Field(default=0, ge=0)
     time_limit: float = Field(default=120.0, gt=0)
     window: float | None = Field(default=None, gt=0)
+
+    @field_validator("fit_on")
+    @classmethod
+    def _some(cls, names: list[str] | None) -> list[str] | None:
+        if names == []:
+            raise ValueError("names no recording; leave it out to fit on every one that is not held out")
+        return names
 
 
 class EstimatorTable(_OpenTable):

@@ -5,10 +5,21 @@ from dataclasses import fields
 
 from ..effect import Effect
 from ..errors import InputError, RolloutFailed
-from ..material import UNITS, Material, with_fields
+from ..material import UNITS, Material, check_meant, with_fields
 from ..parameters import Parameter
 from ..registry import nearest
 from .config import ParameterTable, StudyConfig
+
+
+def given_material(config: StudyConfig, default: Material) -> Material:
+    """The material with what the study says of it; values that cannot be meant are refused."""
+    material = with_fields(default, dict(config.material))
+    for name, value in config.material.items():
+        try:
+            check_meant(material.kind, name, value)
+        except InputError as error:
+            raise InputError(f"[material.{name}]: {error}") from error
+    return material
 
 
 def material_parameters(config: StudyConfig, material: Material) -> tuple[Parameter, ...]:
@@ -32,6 +43,7 @@ def _check_bound(material: Material, name: str, bound: float) -> None:
         return
     try:
         with_fields(material, {name: bound})
+        check_meant(material.kind, name, bound)
     except InputError as error:
         raise InputError(f"[parameters.{name}]: {error}") from error
 

@@ -28,7 +28,7 @@ from ..scenarios.standoffs import told_beside
 from ..simulated_take import SimulatedTake
 from ..simulator import Simulator
 from .config import StudyConfig
-from .inferred import effect_values, material_parameters
+from .inferred import effect_values, given_material, material_parameters
 from .objects import build_scenario, check_unstretched, keep_points
 from .windows import cut_all
 
@@ -177,7 +177,7 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
         kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])
         scenarios = {n: replace(s, kept=kept) for n, s in scenarios.items()}
         scenarios |= {n: with_earlier(scenarios[n], keep_points(r, config.scenario.points)) for n, r in whole.items()}
-    material = with_fields(base.default_material(kind), dict(config.material))
+    material = given_material(config, base.default_material(kind))
     effects = {n: REGISTRY.get("effect", n) for n in config.effects}
     for name in config.diagnose.candidates or []:
         REGISTRY.get("effect", name)

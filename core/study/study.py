@@ -36,6 +36,9 @@ class Study:
         path: where the study file is, or would be; relative paths in it start there.
         workers: worker processes; None takes one a core.
         progress: called as work goes on.
+
+    Raises:
+        InputError: results would be written over the measurement.
     """
 
     def __init__(
@@ -45,6 +48,12 @@ class Study:
         self.path = path
         self.workers = workers
         self.progress = progress
+        results, measured = self.results_path.resolve(), self.measurement_path.resolve()
+        if results == measured or results in measured.parents or measured in results.parents:
+            raise InputError(
+                f"{path}: results would go to {self.results_path}, and the measurement is {self.measurement_path}; "
+                "give each a place of its own: name another in [study] results"
+            )
 
     @classmethod
     def load(cls, path: str | Path, *, workers: int | None = None, progress: Progress = silent) -> "Study":
@@ -122,7 +131,13 @@ class Study:
                 root.attrs["kind"] = "results"
         if not self.results_path.exists():
             raise StepMissingError(f"{self.path} has not been fitted yet; run: muslin fit {self.path}")
-        return open_store(self.results_path, mode)
+        root = open_store(self.results_path, mode)
+        if (kind := root.attrs.get("kind")) != "results":
+            raise InputError(
+                f"{self.results_path} is a {kind}, not a store of results; name another in [study] results of "
+                f"{self.path}"
+            )
+        return root
 
     def check_writable(self) -> None:
         """Refuse results that cannot be written now, and not when the work is done.

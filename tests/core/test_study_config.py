@@ -85,6 +85,25 @@ def test_recordings() -> None:
     assert "nothing is left to fit on" in complaint(study__hold_out=["a", "b"])
 
 
+def test_fitting_on_nothing_is_not_fitting_on_everything() -> None:
+    told = complaint(study__fit_on=[])
+    assert "[study.fit_on] names no recording; leave it out to fit on every one that is not held out" in told
+
+
+def test_a_material_in_another_unit() -> None:
+    told = complaint(material={"areal_density": 150.0})
+    assert "[material.areal_density]: areal_density is in kg/m2 and must lie between 0 and 20, but is 150" in told
+    assert told.endswith("150 g/m2 are 0.15")
+    assert "20, but is 50" in complaint(parameters={"areal_density": {"low": 0.05, "high": 50.0}})
+    rope = {"scenario": {"name": "hang", "size": [0.4], "vertices": [9]}, "parameters": {}}
+    assert "linear_density is in kg/m" in complaint(material={"linear_density": 50.0}, **rope)
+    assert "diameter is in m " in complaint(material={"diameter": 8.0}, **rope)
+    beam = {"scenario": {"name": "beam", "markers": list(range(9))}, "parameters": {}}
+    assert "density is in kg/m3 and must lie between 3 and 30000, but is 1.07" in complaint(
+        material={"density": 1.07}, **beam
+    )
+
+
 def test_units_and_bounds_of_parameters() -> None:
     wrong = complaint(parameters={"stretch_stiffness": {"low": 1.0, "high": 2.0, "unit": "Pa"}})
     assert "unit is 'Pa', but stretch_stiffness is in 'N/m'" in wrong

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from muslin.core.camera import Camera
+from muslin.core.errors import InputError
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.registry import REGISTRY
@@ -34,6 +35,7 @@ CAMERA = Camera(320, 240, 400.0, 400.0, 160.0, 120.0, np.array([0.0, -1.0, 1.0, 
 
 
 def study_in(folder: Path, camera: Camera = CAMERA, **extractor: Any) -> Study:
+    folder.mkdir(exist_ok=True)
     body = preset("fling").body(vertices=[3, 3])
     series = PointSeries(np.linspace(0, 0.1, 4), np.tile(body.vertices[:, :2], (4, 1, 1)), "px")
     save_measurement(Measurement((Recording("a", series, camera=camera),)), folder / "m.zarr")
@@ -47,7 +49,6 @@ def study_in(folder: Path, camera: Camera = CAMERA, **extractor: Any) -> Study:
 
 def test_another_camera_is_another_measurement(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
-    one.mkdir(), two.mkdir()
     longer = study_in(two, replace(CAMERA, fx=800.0, fy=800.0))
     assert study_in(one).fingerprint() != longer.fingerprint()
 
@@ -64,3 +65,20 @@ def test_weights_that_were_learned_anew_are_another_study_and_go_along_with_an_e
     better = study.add("viscous-damping", tmp_path / "elsewhere" / "study.toml")
     assert Path(better.config.extractor.options["weights"]) == weights.resolve()
     assert Study.load(better.path).problem.extractor.ready
+
+
+@pytest.mark.parametrize("results", ["m.zarr", "./x/../m.zarr", "m.zarr/out.zarr", "."])
+def test_results_do_not_go_where_the_measurement_is(tmp_path: Path, results: str) -> None:
+    (tmp_path / "x").mkdir()
+    file = study_in(tmp_path).path
+    file.write_text(file.read_text().replace("[scenario]", f'results = "{results}"\n[scenario]'))
+    with pytest.raises(InputError, match=r"give each a place of its own: name another in \[study\] results"):
+        Study.load(file)
+
+
+def test_results_do_not_go_into_a_store_of_something_else(tmp_path: Path) -> None:
+    file = study_in(tmp_path).path
+    (tmp_path / "n.zarr").symlink_to(study_in(tmp_path / "other").measurement_path)
+    file.write_text(file.read_text().replace("[scenario]", 'results = "n.zarr"\n[scenario]'))
+    with pytest.raises(InputError, match="is a measurement, not a store of results"):
+        Study.load(file).results("r+")
