@@ -11,6 +11,7 @@ from ..core.body import Body
 from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
+from ..core.pose_span import uncovered
 from ..core.registry import REGISTRY
 from ..core.scenario import Scenario
 from ..core.scenarios.measured import MEASURED_NEAR
@@ -217,6 +218,7 @@ def doubtful_starts(problem: Problem) -> list[str]:
                 f"warning: {name} has {recording.gripper.grippers} grippers, but the object is held by "
                 f"{len(scenario.grasps)}; give every gripper its vertices in [scenario] grasps"
             )
+        remarks += [f"warning: {name}: {remark}" for remark in uncovered(recording)]
         parts = _parts(scenario.body)
         if parts > 1:
             remarks.append(

@@ -15,6 +15,7 @@ from ..core.errors import InputError
 from ..core.importing import ImportOptions, import_file
 from ..core.measurement import Measurement, Recording
 from ..core.measurement_store import save_measurement
+from ..core.pose_span import uncovered
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS
 from .console import command, next_step, say
@@ -203,6 +204,8 @@ def import_files(
     say(f"wrote {output}")
     for recording in measurement.recordings:
         say("  " + summary(recording))
+        for remark in uncovered(recording):
+            say(f"    warning: {remark}")
     next_step(
         command("new", "study.toml", "--measurement", output, "--scenario", scenario, "--simulator", "mujoco"),
         note=f"scenarios: {', '.join(PRESETS)}",

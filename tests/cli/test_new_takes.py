@@ -1,4 +1,4 @@
-"""Which takes ``muslin new`` chooses where nobody says, and how it says so."""
+"""Which takes ``muslin new`` chooses where nobody says, how it says so, and what it says of those that end early."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -82,3 +82,20 @@ def test_takes_that_differ_in_how_many_points_they_have_are_told_apart(
     assert "--fit-on one,three" in said and "--points I,J" in said and not (tmp_path / "s.toml").exists()
     assert status(*new, "--fit-on", "one,three") == 0
     assert status(*new, "--force", "--points", "0,2,4,6") == 0
+
+
+def test_poses_that_end_before_the_points_are_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mujoco")
+    time = np.linspace(0.0, 1.8, 37)
+    rest = preset("fling").body(vertices=[3, 3]).vertices + np.array([0.0, 0.0, 1.0])
+    poses = np.zeros((13, 1, 3))
+    poses[:, 0] = [0.0, 0.0, 1.0] + time[:13, None] * np.array([0.0, 0.2, 0.0])
+    np.savez(
+        tmp_path / "a.npz", time=time, points=np.tile(rest, (37, 1, 1)), gripper_pose=poses, gripper_time=time[:13]
+    )
+    assert status("import", tmp_path / "a.npz", "-o", tmp_path / "m.zarr") == 0
+    told = "the gripper poses end at 0.6 s, the points go on to 1.8 s"
+    assert f"warning: {told}" in capsys.readouterr().out
+    made = ("--measurement", tmp_path / "m.zarr", "--scenario", "fling", "--vertices", "3,3")
+    assert status("new", tmp_path / "s.toml", *made) == 0
+    assert f"warning: a: {told}" in " ".join(capsys.readouterr().out.split())
