@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import zarr
+from zarr.storage import LocalStore
 
 from .errors import InputError, MissingFileError, MuslinError, StoreError
 
@@ -212,7 +213,7 @@ def frame_of(array: zarr.Array[Any], number: int) -> npt.NDArray[Any]:
 
 def _check_chunks(array: zarr.Array[Any], chunks: Iterable[tuple[int, ...]]) -> None:
     """A chunk that is gone is damage, though zarr takes it for fill values. Looked up one by one: listing is slower."""
-    if not array.attrs.get(_COMPLETE):
+    if not (array.attrs.get(_COMPLETE) and isinstance(array.store_path.store, LocalStore)):
         return
     folder = str(array.store_path).removeprefix("file://")
     for chunk in chunks:
