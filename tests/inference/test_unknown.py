@@ -21,6 +21,7 @@ from muslin.inference.criticism.unknown.basis import make_basis, mesh_modes
 from muslin.inference.criticism.unknown.decision import Case, decide
 from muslin.inference.criticism.unknown.field import field_effect
 from muslin.inference.criticism.unknown.law_file import add_law, law_effect, read_law
+from muslin.inference.criticism.unknown.library import Piece
 from muslin.inference.criticism.unknown.refit import RefittedLaw
 from muslin.inference.criticism.unknown.result import law_table, law_text
 from muslin.inference.polish import Polished
@@ -152,7 +153,7 @@ def refitted(rss: float, **held_out: float) -> RefittedLaw:
     """A law that leaves so much [noise variances] of 300 numbers, and these errors on held-out recordings [m]."""
     space = ParameterSpace((Parameter("stiffness", "Pa", 0, 1), Parameter("law.linear_drag", "1/s", 0, 10)))
     fit = Polished(np.array([0.5, 0.3]), np.full(300, np.sqrt(rss / 300)), np.zeros((300, 2)), np.eye(2) * 1e-4, 300.0)
-    return RefittedLaw("drag", space, 1, fit, held_out)
+    return RefittedLaw((Piece("drag", ("linear_drag",)),), space, 1, fit, held_out)
 
 
 def test_of_what_cannot_be_simulated_without_a_law_no_shares_are_told() -> None:
