@@ -44,8 +44,7 @@ def check_apart(path: Path, study: Study) -> None:
     for what, store in (("measurement", study.measurement_path), ("results", study.results_path)):
         if place.is_relative_to(store.resolve()):
             raise InputError(f"{path} lies in the {what} of {study.path}; name a file outside of {store}")
-    named = [*study.config.scenario.files, study.config.extractor.options.get("weights")]
-    if place in [(own.parent / name).resolve() for name in named if isinstance(name, str)]:
+    if place in [(own.parent / name).resolve() for name in study.config.files]:
         raise InputError(f"{path} is a file that {study.path} needs; name another file to write")
 
 

@@ -1,6 +1,7 @@
 """The study file: one TOML table a topic, every key checked."""
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
@@ -118,6 +119,18 @@ class StudyConfig(StrictTable):
     noise: NoiseTable = Field(default_factory=NoiseTable)
     nuisance: NuisanceTable = Field(default_factory=NuisanceTable)
     diagnose: DiagnoseTable = Field(default_factory=DiagnoseTable)
+
+    @property
+    def files(self) -> list[str]:
+        """Meshes and what an extractor has learned, as they are written; not its stores."""
+        learned = self.extractor.options.get("weights")
+        return [*self.scenario.files, *([learned] if isinstance(learned, str) else [])]
+
+    def move_files(self, to: Callable[[str], str]) -> None:
+        """Name every one of :attr:`files` anew."""
+        self.scenario.move_files(to)
+        if isinstance(learned := self.extractor.options.get("weights"), str):
+            self.extractor = self.extractor.model_copy(update={"weights": to(learned)})
 
     @model_validator(mode="after")
     def _disjoint(self) -> "StudyConfig":

@@ -104,15 +104,10 @@ class Study:
         names = {r.name for pair in repeats(problem.recordings.values()) for r in pair} | set(problem.fit_on)
         used = [r for n, r in problem.recordings.items() if n in names or step != "fit"]
         table["measured"] = {r.name: _digest(r) for r in used}
-        learned = self.config.extractor.options.get("weights")
-        for name in (*self.config.scenario.files, *([learned] if isinstance(learned, str) else [])):
+        for name in self.config.files:
             content = (self.path.parent / name).read_bytes()
             table.setdefault("files", {})[name] = hashlib.sha256(content).hexdigest()
         return table
-
-    def _found(self, name: str) -> str:
-        """The absolute path of a file that the study file names."""
-        return str((self.path.parent / name).resolve())
 
     def set_aside(self) -> Path | None:
         """Move results of an earlier state of the study out of the way; nothing that was simulated is lost."""
@@ -231,9 +226,7 @@ class Study:
             config.study.results = f"{path.stem}.results.zarr"
         if path.parent.resolve() != self.path.parent.resolve():
             config.study.measurement = str(self.measurement_path.resolve())
-            config.scenario.move_files(self._found)
-            if isinstance(learned := config.extractor.options.get("weights"), str):
-                config.extractor = config.extractor.model_copy(update={"weights": self._found(learned)})
+            config.move_files(lambda name: str((self.path.parent / name).resolve()))
         study = Study(config, path, workers=self.workers, progress=self.progress)
         study.problem  # noqa: B018  an effect that cannot act here is refused before anything is written
         study.save()
