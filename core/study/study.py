@@ -206,10 +206,11 @@ class Study:
                 the effect's own priors.
 
         Raises:
-            InputError: the study has it already, the file is there, or the effect is no candidate, which must be
-                told its coefficients: all of them at once are more than recordings tell.
+            InputError: the study has it already, the file is there, or the effect is no candidate and has several
+                coefficients, of which it must be told some: all of them at once are more than recordings tell.
         """
-        if not REGISTRY.get("effect", effect).candidate and coefficients is None:
+        added = REGISTRY.get("effect", effect)
+        if not added.candidate and len(added.coefficients) > 1 and coefficients is None:
             raise InputError(
                 f"{effect!r} must be told which of its coefficients to infer: give them to Study.add, or add a law "
                 f"that muslin unknown has found: muslin unknown {self.path} --json law.json, then "

@@ -61,6 +61,13 @@ class FitResult:
         """The best fit by name."""
         return dict(zip(self.names, self.estimate.tolist(), strict=True))
 
+    @property
+    def apart(self) -> list[str]:
+        """Parameters whose best fit lies outside the posterior, so that neither is to be trusted."""
+        mean, spread = self.samples.mean(axis=0), self.samples.std(axis=0)
+        rows = zip(self.names, mean, self.estimate, spread, strict=True)
+        return [name for name, m, best, sd in rows if abs(m - best) > _WIDER * sd]
+
     def text(self) -> str:
         """A few lines for people."""
         lines = [
@@ -83,9 +90,7 @@ class FitResult:
     def _explained(self, mean: FloatArray, spread: FloatArray) -> list[str]:
         """Why best fit and posterior differ where they do."""
         wide = [n for n, p, b in zip(self.names, spread, self.sd, strict=True) if p > _WIDER * b]
-        apart = [
-            n for n, m, e, p in zip(self.names, mean, self.estimate, spread, strict=True) if abs(m - e) > _WIDER * p
-        ]
+        apart = self.apart
         lines = []
         if wide:
             lines.append(

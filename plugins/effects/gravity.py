@@ -1,4 +1,4 @@
-"""Gravity that does not point down the z axis of the measurement."""
+"""Gravity that does not point down the z axis of the measurement, or is not as strong as it is taken to be."""
 
 from typing import ClassVar
 
@@ -28,3 +28,25 @@ class GravityTilt(Effect):
         turn_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
         turn_y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
         return np.asarray(turn_y @ turn_x @ gravity)
+
+
+class GravityStrength(Effect):
+    """Gravity that is stronger than the standard one by ``excess``, and points where it did.
+
+    So seems gravity where lengths or times were measured by another scale: if all lengths read a share too long, or
+    the clock runs half that share too slow, what falls is faster by that share. Gravity itself differs by 0.5 % on
+    Earth.
+    """
+
+    name: ClassVar[str] = "gravity-strength"
+    acts_on: ClassVar[str] = "gravity"
+    #: Stiffness or drag can stand in for it on most objects; what is known to ten digits needs no guess.
+    candidate: ClassVar[bool] = False
+    coefficients: ClassVar[tuple[Parameter, ...]] = (
+        Parameter("excess", "m/s2", -2.0, 2.0, description="beyond standard gravity, 9.80665 m/s2"),
+    )
+    symptom: ClassVar[str] = "falls and swings at another pace in the model, whatever it is made of"
+
+    def on_gravity(self, gravity: FloatArray) -> FloatArray:
+        strength = float(np.linalg.norm(gravity))
+        return np.asarray(gravity * (1.0 + self.values["excess"] / strength)) if strength else gravity

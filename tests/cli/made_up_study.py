@@ -94,7 +94,8 @@ def put_fit(root: zarr.Group, drag: bool = False) -> None:
         scale=["log", "log", "linear", "linear"][: len(names)], seed=7, rounds=2, simulations=240, failed=3,
         warnings=["3 of 240 draws could not be simulated: 3 times 'an edge is stretched 3.2 times at 0.400 s'"],
         seconds=48.3, engine="mujoco 4.0.0", estimator="bayessim-rkhs", at_bound=[] if drag else ["areal_density"],
-        noise={"sd": NOISE, "ar1": 0.1, "source": "repeats", "unit": "m"},
+        noise={"sd": NOISE, "ar1": 0.1, "source": "repeats", "unit": "m", "relative_error": 0.1},
+        ended="the posterior did not move further", derivative_step=0.002,
     )  # fmt: skip
 
 

@@ -213,6 +213,7 @@ def test_an_effect_that_is_no_candidate_is_added_with_its_coefficients_alone(
     assert not list(folder.glob("*.toml"))
     added = study.add("wide", coefficients={"velocity_x": 0.0})
     assert "wide.velocity_y" in added.problem.space.names and "wide.velocity_x" not in added.problem.space.names
+    assert "gravity-strength.excess" in study.add("gravity-strength").problem.space.names  # one leaves no choice
 
 
 def test_paths_start_at_the_study_file_and_results_at_the_content(

@@ -40,6 +40,7 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
         {"compliance": "m/N", "turn_compliance": "rad/(N m)"},
     ),
     "grasp-slip": ("grasp", "bind_grasp on_material", "cloth rope", {"slipperiness": "1/N"}),
+    "gravity-strength": ("gravity", "on_gravity", ALL, {"excess": "m/s2"}),
     "gravity-tilt": ("gravity", "on_gravity", ALL, {"about_x": "rad", "about_y": "rad"}),
     "hem": ("mass", "on_loads", "cloth", {"line_mass": "kg/m"}),
     "internal-damping": ("material", "on_material", ALL, {"damping_time": "s"}),

@@ -1,4 +1,4 @@
-"""Gravity turned by the angles it says."""
+"""Gravity turned by the angles it says, and stronger by as much as it says."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from muslin.core.body import cloth_grid
 from muslin.core.material import ClothMaterial
-from muslin.plugins.effects.gravity import GravityTilt
+from muslin.plugins.effects.gravity import GravityStrength, GravityTilt
 
 DOWN = np.array([0.0, 0.0, -G])
 angles = st.floats(-3.0, 3.0)
@@ -55,3 +55,23 @@ def test_a_hanging_strip_leans_by_the_angle(angle):
     hanging = vertices(body, material, [0.0, 0.01], effect, grasps=([0, 1],), settle=2.5)[0]
     tip = hanging[-2:].mean(axis=0)
     assert np.arctan2(tip[1], -tip[2]) == pytest.approx(angle, rel=1e-2)
+
+
+@cases
+@given(st.floats(-2.0, 2.0), angles)
+def test_strength_is_added_along_gravity_whichever_way_it_points(excess, angle):
+    leaning = GravityTilt(about_x=angle).on_gravity(DOWN)
+    stronger = GravityStrength(excess=excess).on_gravity(leaning)
+    np.testing.assert_allclose(stronger, leaning * (G + excess) / G, rtol=1e-12, atol=1e-12)
+
+
+def test_a_free_body_falls_faster_by_what_gravity_exceeds():
+    def fallen(excess):
+        moved = vertices(SHEET, ClothMaterial(), [0.0, 0.3], GravityStrength(excess=excess))[1] - SHEET.vertices
+        return moved[:, 2]
+
+    np.testing.assert_allclose(fallen(1.0) / fallen(0.0), (G + 1.0) / G, rtol=1e-8)
+
+
+def test_without_gravity_there_is_none_to_be_stronger():
+    np.testing.assert_array_equal(GravityStrength(excess=1.0).on_gravity(np.zeros(3)), np.zeros(3))
