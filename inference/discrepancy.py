@@ -31,25 +31,16 @@ class Discrepancy:
     Args:
         directions: ``D``, ``(N_r, K)`` a recording, in units of the noise; recordings without any may be missing.
         chance: diagonal of ``V``, ``(N_r,)`` a recording [noise variances]; the same.
-        beyond: further directions like ``D`` that residuals are not whitened by, as going along them lets the model as
-            it is part further from the measurement: they may excuse what is left of it once it is mended.
         step: at which derivatives of residuals are told, between chance and curvature.
     """
 
     directions: Mapping[str, FloatArray] = field(default_factory=dict)
     chance: Mapping[str, FloatArray] = field(default_factory=dict)
-    beyond: Mapping[str, FloatArray] = field(default_factory=dict)
     step: float = MOST_STEP
 
     @cached_property
     def _factors(self) -> dict[str, Factors]:
         return {name: self._factored(name, d) for name, d in self.directions.items()}
-
-    @cached_property
-    def _all_factors(self) -> dict[str, Factors]:
-        """Of all directions, those beyond included."""
-        every = {n: [d[n] for d in (self.directions, self.beyond) if n in d] for n in {*self.directions, *self.beyond}}
-        return {name: self._factored(name, np.hstack(d)) for name, d in every.items()}
 
     def _factored(self, recording: str, directions: FloatArray) -> Factors:
         """Left singular vectors and singular values of what is scaled by chance already."""
@@ -82,23 +73,6 @@ class Discrepancy:
             return white
         u, s = self._factors[recording]
         return np.asarray(white + u @ ((1.0 / np.sqrt(1.0 + s**2) - 1.0) * (u.T @ white)))
-
-    def explained(self, recording: str, whitened: FloatArray) -> float:
-        """What the most probable amplitudes of all directions explain ``|D a|^2`` [noise variances].
-
-        Args:
-            recording: whose residuals these are.
-            whitened: by :meth:`whitened` ``(N_r,)``.
-        """
-        if recording not in self._all_factors:
-            return 0.0
-        scaled = whitened
-        if recording in self.directions:
-            u, s = self._factors[recording]
-            scaled = whitened + u @ ((np.sqrt(1.0 + s**2) - 1.0) * (u.T @ whitened))
-        u, s = self._all_factors[recording]
-        # a = V s / (1 + s^2) U' r, and D a = U s V' a
-        return float(np.sum((s**2 / (1.0 + s**2) * (u.T @ scaled)) ** 2))
 
 
 NONE = Discrepancy()

@@ -62,10 +62,9 @@ class Roughness:
         noise: Noise,
         offsets: Offsets,
         directions: Mapping[str, FloatArray] | None = None,
-        beyond: Mapping[str, FloatArray] | None = None,
     ) -> Discrepancy:
         """What this, and ``directions`` if there are any, mean for residuals and their derivatives."""
-        return Discrepancy(directions or {}, self.chance(recordings, noise, offsets), beyond or {}, self.step(noise))
+        return Discrepancy(directions or {}, self.chance(recordings, noise, offsets), self.step(noise))
 
 
 def roughness(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, recordings: Sequence[str]) -> Roughness:

@@ -28,7 +28,6 @@ class Candidate:
         fit: jointly polished, in units of the noise.
         held_out: root mean square error on each held-out recording [unit].
         held_out_white: mean square of all of them, whitened by noise and numerics [noise variances].
-        numerics: what errors of the numbers themselves explain in the fit's residuals [noise variances].
         held_out_shift: how far it is on held-out recordings from the model without it, as a sum of squares [noise
             variances].
         promised: residual sum of squares that a linear model promised at the first look.
@@ -43,7 +42,6 @@ class Candidate:
     fit: Polished
     held_out: dict[str, float] = field(default_factory=dict)
     held_out_white: float = float("nan")
-    numerics: float = 0.0
     held_out_shift: float = float("inf")
     promised: float = float("inf")
     approached: bool = False

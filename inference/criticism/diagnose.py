@@ -175,7 +175,6 @@ def _result(
             "misfit_after": after.rss / joint.count,
             "held_out": joint.held_out_white if held else None,
             "explained": joint.explained(after),
-            "numerics": joint.nearest.numerics / joint.excess,
         },
         "numerics": work.moved,
         "unrepeatable": unrepeatable(work.rough, problem.recordings, work.fit.noise),

@@ -29,14 +29,12 @@ class Numerics:
 
     Args:
         directions: of the white residuals, ``(N_r, K)`` by recording.
-        beyond: those of changes that take the model further from the measurement: better numbers do not explain it.
         moved: how far the fitted recordings go from what the model predicts, root mean square a coordinate, by what
             was changed: ``"step"`` (half of it), ``"mesh"`` (finer), or the name of another engine [m or px].
         cost: rollouts elsewhere that it took.
     """
 
     directions: dict[str, FloatArray]
-    beyond: dict[str, FloatArray]
     moved: dict[str, float]
     cost: int
 
@@ -46,7 +44,7 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
 
     Each direction comes twice, see :func:`changes`. Directions that cannot be had (no other engine is there, or it
     cannot do this) are left out. A change towards better numbers that lets the misfit grow cannot be what the misfit is
-    due to: its directions are kept apart (:attr:`Numerics.beyond`).
+    due to: its directions are left out.
     """
     problem = pool.problem
     names = (*problem.fit_on, *problem.hold_out)
@@ -65,7 +63,6 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
             variants[simulator.name] = replace(problem, simulator=simulator), 1.0, 1
     as_it_is = _predicted(pool, values, names)
     towards: dict[str, list[FloatArray]] = {n: [] for n in names}
-    beyond: dict[str, list[FloatArray]] = {n: [] for n in names}
     with ExitStack() as stack:  # an interruption ends the processes first, then the threads that wait for them
         threads = stack.enter_context(ThreadPoolExecutor(max(1, pool.workers)))
         # a few rollouts each: but on the finer mesh, starting more than one process would take longer
@@ -79,14 +76,14 @@ def numerics(pool: SimulationPool, values: dict[str, float], noise: Noise, offse
             for name in names
             if name in made.keys() & as_it_is.keys()
         }
-        gain = sum(g for name, (_, g) in found.items() if name in problem.fit_on)
-        for name, (columns, _) in found.items():
-            (towards if gain >= 0.0 else beyond)[name] += columns
+        if sum(gain for name, (_, gain) in found.items() if name in problem.fit_on) >= 0.0:
+            for name, (columns, _) in found.items():
+                towards[name] += columns
         both = [n for n in problem.fit_on if n in made.keys() & as_it_is.keys()]
         pairs = [(as_it_is[n].points, made[n].points) for n in both]
         if alike := [(a, b) for a, b in pairs if a.shape == b.shape]:
             moved[what] = rms_apart(alike)
-    return Numerics(_stacked(towards), _stacked(beyond), moved, cost)
+    return Numerics(_stacked(towards), moved, cost)
 
 
 def _stacked(columns: dict[str, list[FloatArray]]) -> dict[str, FloatArray]:

@@ -185,8 +185,6 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
         return "its coefficients may as well be zero"
     if why == "little":
         return f"at least {100 * EXPLAINS:.0f} % is asked"
-    if why == "unaccounted":
-        return "what it leaves is neither noise nor what the numbers of the model make"
     if why == "held-out":
         return "motions that it was not fitted to get no better"
     first = result["candidates"][0]["name"]

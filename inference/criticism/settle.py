@@ -7,12 +7,15 @@ from scipy import stats
 
 from .candidate import Candidate, best_starts
 from .stage import MORE_EVALUATIONS, NEARLY, Stage
-from .verdict import EXPLAINS, MARGIN, Evidence, decide, objection
+from .verdict import MARGIN, Evidence, decide, objection
 from .work import Work
 
 #: Points of the parameters' prior that are looked at (a power of two), how many of the best are fitted from, and
 #: evaluations of each before it is given up.
 PLACES, RESTARTS, FEW_EVALUATIONS = 16, 2, 12
+#: A leader that explains less than this share of the excess misfit is not fitted further: that would not make it the
+#: answer.
+HOPEFUL = 0.5
 
 
 def settled(work: Work, stage: Stage) -> Stage:
@@ -24,7 +27,7 @@ def settled(work: Work, stage: Stage) -> Stage:
     if not any(c.refitted for c in stage.evidence.candidates):
         return stage
     leader = min(_passing(stage.evidence) or stage.evidence.candidates, key=lambda c: c.rank)
-    if stage.evidence.explained(leader) < EXPLAINS:
+    if stage.evidence.explained(leader) < HOPEFUL:
         return stage
     evidence = _with(stage.evidence, _fitted_on(work, stage, leader))
     reached = evidence.explained(evidence.nearest)

@@ -9,7 +9,7 @@ from .candidate import Candidate
 from .pairs import Pair, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import MARGIN, SHARE_LEFT, Decision, Verdict
+from .verdict import EXPLAINS, MARGIN, SHARE_LEFT, Decision, Verdict
 from .work import Work
 
 #: Effects that one diagnosis may name.
@@ -129,7 +129,10 @@ def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Find
     likely = {*partners(first, lead.name, PARTNERS), *(n for p in pairs if lead.name in p.names for n in p.names)}
     rest = [n for n in names if n in likely - {lead.name}]
     stage = _stage(work, first, (lead.name,), rest, lead.fit.unit, pairs)
-    if stage.decision.verdict != "named" or not work.jointly(stage.chosen, first.plain).accounted(stage.chosen):
+    if stage.decision.verdict != "named":
+        return None
+    joint = work.jointly(stage.chosen, first.plain)
+    if joint.explained(joint.nearest) < EXPLAINS:
         return None
     named = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
     return _forward(work, names, _without_idle(work, named), pairs)

@@ -11,10 +11,9 @@ from .misfit import chance, is_misfit
 
 Verdict = Literal["named", "tied", "none", "cannot-tell", "no-misfit"]
 
-#: An effect is named only if it explains at least this share of the excess misfit ...
-EXPLAINS = 0.5
-#: ... and what it leaves is noise, this share of the excess, or what the model's own numbers explain ...
-UNACCOUNTED = 0.2
+#: An effect is named only if it explains at least this share of the excess misfit: the right one, fitted to the end,
+#: leaves next to nothing, and one that stands in for what is in no list explains half to three quarters ...
+EXPLAINS = 0.8
 #: ... with at least this significance [standard deviations] ...
 SIGNIFICANT = 4.0
 #: ... and rivals are worse by more than this in -2 log likelihood (a Bayes factor of about 150) ...
@@ -114,10 +113,6 @@ class Evidence:
         """What a candidate leaves beyond what noise may [noise variances]."""
         return max(0.0, candidate.rss - self.count - self.chance)
 
-    def accounted(self, candidate: Candidate) -> bool:
-        """Is what the candidate leaves small, or of a kind that the model's own numbers make?"""
-        return self.left(candidate) <= UNACCOUNTED * self.excess + candidate.numerics
-
 
 @dataclass(frozen=True)
 class Decision:
@@ -134,7 +129,7 @@ def has_misfit(e: Evidence) -> bool:
 
 
 #: Why a candidate is not the answer: what was asked of it and not met, in the order in which it is asked.
-Objection = Literal["invisible", "chance", "zero", "little", "unaccounted", "held-out", "worse"]
+Objection = Literal["invisible", "chance", "zero", "little", "held-out", "worse"]
 
 
 def objection(e: Evidence, candidate: Candidate) -> Objection | None:
@@ -143,7 +138,6 @@ def objection(e: Evidence, candidate: Candidate) -> Objection | None:
         ("chance", e.z(candidate) >= SIGNIFICANT),
         ("zero", _moved(candidate)),
         ("little", e.explained(candidate) >= EXPLAINS),
-        ("unaccounted", e.accounted(candidate)),
         ("held-out", e.better_held_out(candidate)),
     )
     failed = [name for name, met in asked if not met]
@@ -163,10 +157,17 @@ def decide(e: Evidence) -> Decision:
     if not passing:
         return Decision("none", ())
     best = passing[0]
-    rivals = [c for c in passing[1:] if e.behind(c, best) < MARGIN + SHARE_LEFT * e.left(best)]
+    rivals = [c for c in sorted(e.candidates, key=lambda c: c.rank) if c is not best and _rivals(e, c, best)]
     if rivals:
         return Decision("tied", (best.name, *(c.name for c in rivals)))
     return Decision("named", (best.name,))
+
+
+def _rivals(e: Evidence, candidate: Candidate, best: Candidate) -> bool:
+    """Is it so near to the best that the data cannot tell them, though it may explain a little less than asked?"""
+    why = objection(e, candidate)
+    stands = why is None or (why == "little" and e.better_held_out(candidate))
+    return stands and e.behind(candidate, best) < MARGIN + SHARE_LEFT * e.left(best)
 
 
 def _moved(candidate: Candidate) -> bool:

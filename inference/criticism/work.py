@@ -96,7 +96,7 @@ class Work:
         names = (*self.problem.fit_on, *self.problem.hold_out)
         self.rough = roughness(self.pool, space, unit, names)
         self.discrepancy = self.rough.discrepancy(
-            self.problem.recordings, self.fit.noise, self.offsets, found.directions, found.beyond
+            self.problem.recordings, self.fit.noise, self.offsets, found.directions
         )
         check_repeatable(self.discrepancy, self.problem.fit_on)
         self._elsewhere += found.cost
@@ -175,23 +175,15 @@ class Work:
         return replace(fit, white=white, count=objective.count(white))
 
     def judged(self, candidate: Candidate, plain: HeldOut | None = None) -> Candidate:
-        """With its held-out errors, and what the numerics explain in its residuals [noise variances].
+        """With its held-out errors.
 
         Args:
             candidate: fitted.
             plain: the model without it on the held-out recordings; left out, these count as ones that would show it.
         """
         held = self.held_out(candidate.space, candidate.fit.unit)
-        parts = self.objective(()).parts(candidate.fit.white)
-        numerics = sum(self.discrepancy.explained(recording, part) for recording, part in parts.items())
         shift = float("inf") if plain is None else held.shift(plain)
-        return replace(
-            candidate,
-            held_out=held.errors,
-            held_out_white=held.mean_square,
-            held_out_shift=shift,
-            numerics=numerics,
-        )
+        return replace(candidate, held_out=held.errors, held_out_white=held.mean_square, held_out_shift=shift)
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> HeldOut:
         """A point of a space on the held-out recordings. Each point is simulated once."""

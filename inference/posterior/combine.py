@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...core.arrays import FloatArray
 from ...core.errors import InputError
@@ -20,7 +19,7 @@ from .files import fitted_posterior, fitted_space
 from .physical import PhysicalPosterior
 
 #: Levels of the quantiles that are told.
-LEVELS = (0.05, 0.5, 0.95)
+LEVELS = np.array([0.05, 0.5, 0.95])
 #: Places of the grid over the range that all priors allow.
 POINTS = 4001
 #: Less of a posterior than this within the priors of all others is nothing.
@@ -107,7 +106,7 @@ class Combined:
     def to_json(self) -> dict[str, Any]:
         """Plain values: quantiles [units], and natural logarithms of Bayes factors."""
         return {
-            "levels": list(LEVELS),
+            "levels": LEVELS.tolist(),
             "parameters": [
                 {
                     "name": p.parameter.name,
@@ -156,7 +155,7 @@ def combine(studies: Sequence[Study], names: Sequence[str]) -> Combined:
     for name in names:
         for study, posterior in zip(studies, posteriors, strict=True):
             if name not in posterior.space.names:
-                close = nearest(name, posterior.space.names)
+                close = nearest(name, list(posterior.space.names))
                 inferred = ", ".join(posterior.space.names)
                 raise InputError(f"{study.path} does not infer {name!r}.{close} It infers {inferred}")
     paths, apart = [s.path for s in studies], [load_fit(s).apart for s in studies]
@@ -234,7 +233,7 @@ def _product(log_density: FloatArray, at: FloatArray) -> tuple[float, FloatArray
     return top + math.log(area), np.asarray(product / area)
 
 
-def _quantiles(density: FloatArray, at: FloatArray, levels: ArrayLike) -> FloatArray:
+def _quantiles(density: FloatArray, at: FloatArray, levels: FloatArray) -> FloatArray:
     steps = 0.5 * (density[1:] + density[:-1]) * np.diff(at)
     grown = np.concatenate([[0.0], np.cumsum(steps)])
     return np.interp(levels, grown / grown[-1], at)

@@ -6,11 +6,13 @@ import numpy as np
 
 from ..candidate import drop_z
 from ..misfit import chance, is_misfit
-from ..verdict import EXPLAINS, MARGIN, SHARE_LEFT, SIGNIFICANT
+from ..verdict import MARGIN, SHARE_LEFT, SIGNIFICANT
 from .refit import RefittedLaw
 
-#: Beside what is asked of an effect, a law, which had so many to choose from, must explain this share of the excess
-#: variance on held-out recordings, where there is any to speak of [noise variances].
+#: A law must explain this share of the excess misfit: less than an effect must, as it is made of simple terms. ...
+EXPLAINS = 0.5
+#: ... As it had so many to choose from, it must explain this share of the excess variance on held-out recordings, too,
+#: where there is any to speak of [noise variances].
 HELD_OUT_SHARE, HELD_OUT_EXCESS = 0.5, 0.05
 
 
