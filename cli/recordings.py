@@ -191,7 +191,8 @@ def import_files(
         if take:
             raise InputError("--take names takes of a published set; say which set with --dataset")
         options = ImportOptions(unit=unit, up=up, correspondence=correspondence)
-        recordings, scenario = _of_files(files, options, each), "fling"
+        recordings = _of_files(files, options, each)
+        scenario = "beam" if any(r.load for r in recordings) else "fling"  # loads hang on beams alone
     else:
         own: dict[str, object] = {"--name": name, "--motion": motion, "--load": load, "--gripper": gripper}
         own["--camera"] = camera

@@ -163,7 +163,9 @@ def test_import_of_several_files(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert status("import", *files, "-o", out, "--load", "0", "--load", "0.052", "--motion", "release") == 0
     got = load_measurement(tmp_path / "m.zarr")
     assert [(r.name, r.load, r.motion) for r in got.recordings] == [("a", 0.0, "release"), ("b", 0.052, "release")]
-    assert "next: muslin new" in capsys.readouterr().out
+    assert "--scenario beam" in capsys.readouterr().out
+    assert status("import", *files, "-o", out, "--force") == 0
+    assert "next: muslin new" in (said := capsys.readouterr().out) and "--scenario fling" in said
     assert status("import", *files, "-o", out, "--force", "--load", "0", "--load", "1", "--load", "2") == 2
     assert "--load is given 3 times for 2 files" in capsys.readouterr().err
     assert status("import", *files, "-o", out, "--force", "--name", "x") == 2

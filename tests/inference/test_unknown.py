@@ -92,6 +92,28 @@ def test_without_a_misfit_nothing_is_sought(tmp_path: Path) -> None:
     assert "no misfit" in found.text()
 
 
+def test_a_misfit_is_told_by_squares_whatever_the_tails_of_a_fit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A force that acts for a moment is what tails would leave to a logarithm."""
+    seen = []
+
+    def case(**told: float) -> None:
+        seen.append(told["rss_plain"])
+        raise InputError("that is enough")
+
+    monkeypatch.setattr(step, "Case", case)
+    for tails in (None, 3.0):
+        (folder := tmp_path / str(tails)).mkdir()
+        study = fitted_study(folder, None)
+        fit = study.results("r+")["fit"]
+        fit["estimate_unit"][0] = 0.9  # far from the best
+        fit.attrs["noise"] = {**fit.attrs["noise"], "tails": tails}
+        with pytest.raises(InputError, match="enough"):
+            step.unknown(study)
+    assert seen[0] == seen[1] > 1e4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("push", "terms"),
