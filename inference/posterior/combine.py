@@ -20,8 +20,9 @@ from .physical import PhysicalPosterior
 
 #: Levels of the quantiles that are told.
 LEVELS = np.array([0.05, 0.5, 0.95])
-#: Places of the grid over the range that all priors allow.
-POINTS = 4001
+#: Cells of the grid over the range that all priors allow, and of those into which its first and last are divided: a
+#: posterior that is piled on a bound may all lie in these, and its density need not have a bound there itself.
+CELLS, FINER = 4000, 400
 #: Less of a posterior than this within the priors of all others is nothing.
 LEAST_MASS = 1e-3
 #: Evenly spread draws of all together, by which it is seen whether a bound cuts them off.
@@ -191,36 +192,42 @@ def shared_parameter(name: str, paths: Sequence[Path], posteriors: Sequence[Phys
     if low >= high:
         raise InputError(f"{name}: the priors of these studies have no value in common; widen them and fit again")
     range_of_all = Parameter(name, own[0].unit, low, high, own[0].scale)
-    space, at = ParameterSpace((range_of_all,)), np.linspace(0.0, 1.0, POINTS)
-    values = space.from_unit(at[:, None])[:, 0]
-    density = np.stack([_density(p, path, name, values, at) for p, path in zip(posteriors, paths, strict=True)])
+    space, edges = ParameterSpace((range_of_all,)), _edges()
+    values, widths = space.from_unit(0.5 * (edges[1:] + edges[:-1])[:, None])[:, 0], np.diff(edges)
+    density = np.stack([_density(p, path, name, values, widths) for p, path in zip(posteriors, paths, strict=True)])
     with np.errstate(divide="ignore"):
         log_density = np.log(density)
-    log_factor, product = _product(log_density, at)
-    rows = [space.from_unit(_quantiles(d, at, LEVELS)[:, None])[:, 0] for d in (*density, product)]
-    drawn = _quantiles(product, at, (np.arange(DRAWS) + 0.5) / DRAWS)
+    log_factor, product = _product(log_density, widths)
+    rows = [space.from_unit(_quantiles(d, edges, LEVELS)[:, None])[:, 0] for d in (*density, product)]
+    drawn = _quantiles(product, edges, (np.arange(DRAWS) + 0.5) / DRAWS)
     bounds = tuple(side for side, d in (("lower", drawn), ("upper", 1.0 - drawn)) if cut_off(d))
     odd = None
     if len(paths) > 2 and log_factor < -math.log(TELLING):
-        without = [_product(np.delete(log_density, k, axis=0), at)[0] for k in range(len(paths))]
+        without = [_product(np.delete(log_density, k, axis=0), widths)[0] for k in range(len(paths))]
         best = int(np.argmax(without))
         odd = paths[best] if without[best] > math.log(TELLING) else None
     return SharedParameter(range_of_all, tuple(paths), np.stack(rows[:-1]), rows[-1], log_factor, odd, bounds)
 
 
-def _density(posterior: PhysicalPosterior, path: Path, name: str, values: FloatArray, at: FloatArray) -> FloatArray:
-    """Of one study on the range of all ``(M,)``, relative to the prior there; integrates to one over ``at``."""
+def _edges() -> FloatArray:
+    """Of the cells of the grid, ``(M + 1,)`` from 0 to 1."""
+    finer = np.geomspace(1e-12, 1.0 / CELLS, FINER)
+    return np.concatenate([[0.0], finer, np.arange(2, CELLS - 1) / CELLS, 1.0 - finer[::-1], [1.0]])
+
+
+def _density(posterior: PhysicalPosterior, path: Path, name: str, values: FloatArray, widths: FloatArray) -> FloatArray:
+    """Of one study in the middles of the cells ``(M,)``, relative to the prior on the range of all."""
     index = posterior.space.names.index(name)
     parameter = posterior.space.parameters[index]
     unit = np.clip(ParameterSpace((parameter,)).to_unit(values[:, None])[:, 0], 0.0, 1.0)
     density = posterior.unit.marginal(index, unit)
-    mass = float(np.trapezoid(density, unit))
-    if mass < LEAST_MASS:
+    mass = float(density @ widths)
+    if mass * np.ptp(unit) < LEAST_MASS:
         raise InputError(f"{path}: its posterior of {name} lies outside the priors of the others; widen those")
-    return np.asarray(density / np.trapezoid(density, at))
+    return np.asarray(density / mass)
 
 
-def _product(log_density: FloatArray, at: FloatArray) -> tuple[float, FloatArray]:
+def _product(log_density: FloatArray, widths: FloatArray) -> tuple[float, FloatArray]:
     """Natural logarithm of the Bayes factor of one value for all ``(K, M)``, and the normalised product ``(M,)``."""
     total = log_density.sum(axis=0)
     top = float(total.max())
@@ -229,11 +236,10 @@ def _product(log_density: FloatArray, at: FloatArray) -> tuple[float, FloatArray
             "no value is allowed by all of these studies, so there is none to tell together; combine fewer of them"
         )
     product = np.exp(total - top)
-    area = float(np.trapezoid(product, at))
+    area = float(product @ widths)
     return top + math.log(area), np.asarray(product / area)
 
 
-def _quantiles(density: FloatArray, at: FloatArray, levels: FloatArray) -> FloatArray:
-    steps = 0.5 * (density[1:] + density[:-1]) * np.diff(at)
-    grown = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.interp(levels, grown / grown[-1], at)
+def _quantiles(density: FloatArray, edges: FloatArray, levels: FloatArray) -> FloatArray:
+    grown = np.concatenate([[0.0], np.cumsum(density * np.diff(edges))])
+    return np.interp(levels, grown / grown[-1], edges)

@@ -55,6 +55,15 @@ def test_gaussians_are_combined_as_the_closed_form_says(told: list[tuple[float, 
     assert found.log_factor == pytest.approx(log_factor, abs=0.02)
 
 
+@pytest.mark.parametrize("other", [(0.0, 1.3), (-2.5, 1.2), (4.5, 0.3)])
+def test_one_that_is_piled_on_a_bound_counts_as_the_closed_form_says(other: tuple[float, float]) -> None:
+    """Wider than the prior its density has no bound there; narrow, all of it may lie in the last of many cells."""
+    found = together(gaussian(0.2, 0.3), gaussian(*other))
+    assert found.log_factor == pytest.approx(exact((0.2, other[0]), (0.3, other[1]))[2], abs=0.02)
+    own = np.log(found.quantiles[1] / 10.0) / np.log(1e3)
+    np.testing.assert_allclose(own, norm.cdf(norm.ppf([0.05, 0.5, 0.95], *other)), atol=2e-3)
+
+
 def test_the_order_does_not_matter_and_a_flat_posterior_says_nothing() -> None:
     a, b, flat = gaussian(0.5, 0.3), gaussian(0.1, 0.4), gaussian(0.0, 1.0)
     one, other, more = together(a, b), together(b, a), together(a, flat, b)
