@@ -125,8 +125,10 @@ def _together(two: dict[str, Any] | None, best: dict[str, Any]) -> str:
     """What two effects at once explain, where that is more than the best one does."""
     if two is None or two["explained"] < best["explained"] + _WORTH_TELLING:
         return ""
-    pair = " and ".join(two["effects"])
-    return f" Together {pair} explain {100 * two['explained']:.0f} %, which is more, but not enough for a name."
+    but = "not enough for a name" if two["explained"] < EXPLAINS else "these data do not tell that it is these two"
+    return (
+        f" Together {' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}."
+    )
 
 
 def _is_a_part(best: dict[str, Any]) -> bool:

@@ -77,7 +77,8 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
         return _verdict(none | {"together": two}, {})
 
     pair = {"effects": ["drag", "added-mass"], "explained": 0.81}
-    assert "Together drag and added-mass explain 81 %" in told(pair)
+    assert "Together drag and added-mass explain 81 %, which is more, but these data do not tell" in told(pair)
+    assert "explain 76 %, which is more, but not enough for a name." in told(pair | {"explained": 0.76})
     assert "Together" not in told(pair | {"explained": 0.7})
     assert "Together" not in told(None)
 
