@@ -126,9 +126,7 @@ def _together(two: dict[str, Any] | None, best: dict[str, Any]) -> str:
     if two is None or two["explained"] < best["explained"] + _WORTH_TELLING:
         return ""
     but = "not enough for a name" if two["explained"] < EXPLAINS else "these data do not tell that it is these two"
-    return (
-        f" Together {' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}."
-    )
+    return f" Together {' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}."
 
 
 def _is_a_part(best: dict[str, Any]) -> bool:
@@ -188,7 +186,8 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
     if why == "little":
         return f"at least {100 * EXPLAINS:.0f} % is asked"
     if why == "held-out":
-        return "motions that it was not fitted to get no better"
+        little = candidate["held_out_after"] < candidate["held_out_before"]
+        return f"motions that it was not fitted to get {'better by too little' if little else 'no better'}"
     first = result["candidates"][0]["name"]
     if result["verdict"] == "named" and first not in result["effects"] and candidate["behind"] < MARGIN:
         return f"{' and '.join(result['effects'])} together leave far less"

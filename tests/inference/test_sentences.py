@@ -142,6 +142,14 @@ def test_what_is_missing_beside_others_is_not_told_as_ruled_out() -> None:
     assert told.startswith("Ruled out: hem (40 %") and "lag" not in told
 
 
+@pytest.mark.parametrize("after, said", [(0.0080, "better by too little"), (0.0084, "no better")])
+def test_held_out_motions_that_get_a_little_better_are_not_told_as_no_better(after: float, said: str) -> None:
+    rival = {"name": "wind", "explained": 0.9, "objection": "held-out", "held_out_before": 0.0083}
+    rows = [rival | {"name": "tilt"}, rival | {"held_out_after": after}]
+    told = _alternatives({"effects": ["tilt"], "verdict": "named", "further": [], "candidates": rows})
+    assert told == f"Ruled out: wind (90 %: motions that it was not fitted to get {said})."
+
+
 def test_why_a_candidate_that_passes_by_itself_is_not_named() -> None:
     def told(behind: float, **result: Any) -> str:
         rival = {"name": "wind", "explained": 0.9, "objection": None, "behind": behind}
