@@ -190,7 +190,8 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
         return f"motions that it was not fitted to get {'better by too little' if little else 'no better'}"
     first = result["candidates"][0]["name"]
     if result["verdict"] == "named" and first not in result["effects"] and candidate["behind"] < MARGIN:
-        return f"{' and '.join(result['effects'])} together leave far less"
+        named = result["effects"]
+        return f"{' and '.join(named)} {'leaves' if len(named) == 1 else 'together leave'} far less"
     beside = result["further"] if result["verdict"] == "tied" else result["effects"][1:]
     if candidate["behind"] < MARGIN and beside:  # it was level by itself
         return f"behind with {' and '.join(beside)} in the model"

@@ -160,6 +160,7 @@ def test_why_a_candidate_that_passes_by_itself_is_not_named() -> None:
     assert told(42.0, effects=["tilt", "drag"]) == told(42.0)
     assert told(3.0, effects=["tilt", "drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
     assert "tilt (90 %: lag and drag together leave far less)" in told(3.0, effects=["lag", "drag"])
+    assert "tilt (90 %: lag leaves far less)" in told(3.0, effects=["lag"])  # found beside tilt, which then was idle
     tied = {"verdict": "tied", "effects": ["tilt", "lag"]}
     assert told(42.0, **tied) == told(42.0)
     assert told(3.0, **tied, further=["drag"]) == "Ruled out: wind (90 %: behind with drag in the model)."
