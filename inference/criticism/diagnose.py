@@ -16,7 +16,7 @@ from .candidate_names import candidate_names
 from .sentences import explain, told
 from .stepwise import Findings, find
 from .told import Told
-from .verdict import Evidence, objection
+from .verdict import Evidence
 from .where import where_it_is
 from .work import Work
 
@@ -141,7 +141,7 @@ def _result(
                 "explained": e.explained(c),
                 "z": e.z(c),
                 "behind": e.behind(c, e.nearest),
-                "objection": objection(e, c),
+                "objection": first.objection(c),
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "held_out_shows": c.shown_held_out if held else None,

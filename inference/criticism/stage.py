@@ -10,7 +10,7 @@ from ...core.arrays import FloatArray
 from ..polish import Polished
 from .candidate import Candidate, best_starts, drop_z, screening_points
 from .linear import Look, least_square, look_at
-from .verdict import SIGNIFICANT, Decision, Evidence, decide, has_misfit
+from .verdict import SIGNIFICANT, Decision, Evidence, Objection, decide, has_misfit, objection
 from .work import Work
 
 #: Least-squares evaluations for a candidate that passed the screening, for a contender on top, for the plain model at
@@ -53,6 +53,10 @@ class Stage:
     def chosen(self) -> Candidate:
         """The candidate that the verdict puts first."""
         return self.candidate(self.decision.effects[0])
+
+    def objection(self, candidate: Candidate) -> Objection | None:
+        """What speaks against a candidate; not what is asked of a name, where it is level with one that has it."""
+        return None if candidate.name in self.decision.effects else objection(self.evidence, candidate)
 
 
 def run_stage(

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_verdict import COUNT, candidate
+from test_verdict import COUNT, candidate, evidence
 
 from muslin.core.arrays import FloatArray
 from muslin.inference.criticism import work
 from muslin.inference.criticism.diagnose import _rest
 from muslin.inference.criticism.linear import Look
-from muslin.inference.criticism.stage import _Tournament
-from muslin.inference.criticism.verdict import Decision
+from muslin.inference.criticism.stage import Stage, _Tournament
+from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.criticism.work import Work, usual_simulations
 from muslin.inference.polish import Polished
 
@@ -156,3 +156,13 @@ def test_what_stays_is_told_as_far_as_it_was_looked_into(
     assert _rest(named, joint, spent) == said  # type: ignore[arg-type]
     for other in ({"verdict": "none"}, {"further": ("wind", "drag")}):
         assert _rest(SimpleNamespace(**{**vars(named), **other}), joint, spent) is None  # type: ignore[arg-type]
+
+
+def test_nothing_speaks_against_a_rival_that_is_tied() -> None:
+    """It explains less than a name needs; told as its flaw, a second effect that decides would seem to have no say."""
+    drag, damping = candidate("drag", 2.4 * COUNT), candidate("damping", 2.8 * COUNT)
+    wind = candidate("wind", 4 * COUNT)
+    e = evidence(9 * COUNT, drag, damping, wind)
+    stage = Stage((), candidate("x", 9 * COUNT).fit, {}, e, decide(e))
+    assert stage.decision == Decision("tied", ("drag", "damping"))
+    assert [stage.objection(c) for c in (drag, damping, wind)] == [None, None, "little"]
