@@ -14,7 +14,7 @@ from .before_after import BeforeAfter
 from .candidate import Candidate
 from .candidate_names import candidate_names
 from .sentences import explain, told
-from .stepwise import Findings, find
+from .stepwise import Findings, confirmed, find
 from .told import Told
 from .verdict import Evidence
 from .where import where_it_is
@@ -39,14 +39,14 @@ def diagnose(study: Study) -> Diagnosis:
     with study.pool(problem) as pool:
         work = Work(study, problem, pool, fit)
         found = find(work, names, _fitted(study))
+        plain = found.first.plain
+        joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
+        found = confirmed(replace(found, after=joint.nearest), joint)
         # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain
         started = work.space(()), _fitted(study)
         changed = found.verdict in ("named", "tied")
         later = work.as_a_user_fits(found.after) if changed else found.after.fit.unit
         pair = BeforeAfter(work, started, (found.after.space, later))
-        plain = found.first.plain
-        joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
-        found = replace(found, after=joint.nearest)
         surely = _surely(work, found)
         count = work.simulations
     result = _result(study, found, surely, joint, pair, work, count, time.monotonic() - began)
@@ -138,10 +138,10 @@ def _result(
             {
                 "name": c.name,
                 "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in coefficients.items()},
-                "explained": e.explained(c),
+                "explained": found.doubted.get(c.name, e.explained(c)),
                 "z": e.z(c),
                 "behind": e.behind(c, e.nearest),
-                "objection": first.objection(c),
+                "objection": "little" if c.name in found.doubted else first.objection(c),
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "held_out_shows": c.shown_held_out if held else None,

@@ -1,6 +1,7 @@
 """One effect after the other: forward while something is left, in pairs where one alone is not enough, and back."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from .candidate import Candidate
 from .pairs import Pair, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import EXPLAINS, MARGIN, SHARE_LEFT, Decision, Verdict
+from .verdict import EXPLAINS, MARGIN, SHARE_LEFT, Decision, Evidence, Verdict
 from .work import Work
 
 #: Effects that one diagnosis may name.
@@ -33,6 +34,7 @@ class Findings:
         rest: what was decided with the named ones in the model; None where that was not looked into.
         rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
         together: the two effects that left least where nothing was named, if any were tried.
+        doubted: what one effect explains where it fits, if that is less than it seemed and too little for its name.
     """
 
     verdict: Verdict
@@ -44,6 +46,7 @@ class Findings:
     rest: Decision | None = None
     rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
     together: Pair | None = None
+    doubted: Mapping[str, float] = field(default_factory=dict)
 
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
@@ -62,6 +65,17 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     if verdict == "tied":
         return _with_another(work, names, found, pairs) or found
     return _forward(work, names, found, pairs)
+
+
+def confirmed(found: Findings, joint: Evidence) -> Findings:
+    """No name for one effect that explains too little by the numerics as they are where it fits.
+
+    The stage that named it knew those of the model without it, which was bent far off to make up for what is missing.
+    """
+    explained = joint.explained(joint.nearest)
+    if found.verdict != "named" or len(found.effects) > 1 or explained >= EXPLAINS:
+        return found
+    return Findings("none", (), found.first, found.first, found.after, doubted={found.after.name: explained})
 
 
 def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings:
