@@ -30,6 +30,12 @@ def rest(result: dict[str, Any]) -> str:
     left = f"{result['evidence']['misfit_after'] ** 0.5:.2f} times the noise"
     if result["rest"] == "none":
         return f"More is missing: the fitted recordings are still {left} off, and no further candidate explains that."
+    if result["rest"] == "open":
+        them = "it" if len(result["effects"]) == 1 else "them"
+        return (
+            f"More may be missing: the fitted recordings are still {left} off, which was not looked into with "
+            f"{' and '.join(result['effects'])} in the model; add {them}, and diagnose again."
+        )
     return (
         f"More may be missing: the fitted recordings are still {left} off, and the budget ended after "
         f"{result['simulations']} simulations, before that was looked into; allow more ([diagnose] simulations)."

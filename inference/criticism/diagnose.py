@@ -104,14 +104,15 @@ def _models(found: Findings) -> list[dict[str, Any]]:
 def _rest(found: Findings, joint: Evidence, work: Work) -> str | None:
     """What is known of a misfit that stays with all that was named in the model.
 
-    ``"none"``: no candidate explains it; ``"unfinished"``: the budget ended before that was known; None: there is no
-    such misfit, or nothing was named, or the effects that it is about are told as ``further``.
+    ``"none"``: no candidate explains it; ``"unfinished"``: the budget ended before that was known; ``"open"``: it was
+    not looked into, as no more effects are named at once, or one of them was dropped; None: there is no such misfit, or
+    nothing was named, or the effects that it is about are told as ``further``.
     """
     if found.verdict != "named" or found.further or joint.left(found.after) == 0.0:
         return None
     if found.rest is not None and not found.rest.unfinished:
         return "none" if found.rest.verdict == "none" else None
-    return "unfinished" if work.cut_short else None
+    return "unfinished" if work.cut_short else "open"
 
 
 def _result(

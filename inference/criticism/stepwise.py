@@ -83,7 +83,7 @@ def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -
     while len(found.effects) < MOST_EFFECTS and work.may_go_on():
         rest = [n for n in names if n not in found.effects]
         if not rest:
-            break
+            return replace(found, rest=Decision("none", ()))
         stage = _stage(work, found.first, found.effects, rest, found.after.fit.unit, pairs)
         # the same model, fitted to the end, and its numerics looked at where it fits
         after = work.judged(replace(found.after, fit=stage.plain))

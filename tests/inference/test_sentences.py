@@ -35,6 +35,8 @@ def test_a_misfit_that_stays_beside_what_was_named_is_told() -> None:
     assert not rest(named | {"rest": None})
     told = rest(named | {"rest": "none"})
     assert told.startswith("More is missing") and "1.50 times the noise" in told
+    told = rest(named | {"rest": "open", "effects": ["wind", "lag"]})
+    assert told.startswith("More may be missing") and "with wind and lag in the model; add them, and" in told
     told = rest(named | {"rest": "unfinished"})
     assert told.startswith("More may be missing") and "900 simulations" in told and "[diagnose] simulations" in told
 

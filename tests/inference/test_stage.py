@@ -141,7 +141,7 @@ def test_a_search_goes_on_from_where_the_parameters_make_up_for_an_effect() -> N
     ("left", "rest", "cut_short", "said"),
     [
         (0.0, None, True, None),
-        (9.0, None, False, None),
+        (9.0, None, False, "open"),
         (9.0, None, True, "unfinished"),
         (9.0, Decision("none", ()), False, "none"),
         (9.0, Decision("no-misfit", ()), True, None),

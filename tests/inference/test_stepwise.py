@@ -205,3 +205,12 @@ def test_a_name_stands_only_if_it_explains_enough_where_it_fits() -> None:
     assert doubted.doubted == {"tilt": pytest.approx(0.73, abs=0.01)}
     for other in (replace(found, verdict="tied"), replace(found, effects=("tilt", "wind"))):
         assert confirmed(other, little) is other
+
+
+@pytest.mark.parametrize("names, rest", [(["drag"], Decision("none", ())), (["drag", "lag"], None)])
+def test_where_all_candidates_are_named_none_explains_what_is_left(names: list[str], rest: Decision | None) -> None:
+    first = first_stage({"drag": 2 * COUNT})
+    found = Findings("named", ("drag",), first, first, first.chosen)
+    bench = Bench({}, 1.0)
+    bench.may_go_on = lambda: names == ["drag"]  # type: ignore[method-assign]
+    assert stepwise._forward(bench, names, found, []).rest == rest  # type: ignore[arg-type]
