@@ -90,11 +90,6 @@ class Objective:
         white = residual(recording, predicted.series, self.noise, self.offsets).white
         return self.discrepancy.whitened(recording.name, white)
 
-    def parts(self, white: FloatArray) -> dict[str, FloatArray]:
-        """White residuals ``(N,)`` by recording."""
-        sizes = [len(failed(self.pool.problem.recordings[name], self.offsets)) for name in self.recordings]
-        return dict(zip(self.recordings, np.split(white, np.cumsum(sizes)[:-1]), strict=True))
-
     def count(self, white: FloatArray) -> float:
         """Independent numbers that white residuals ``(N,)`` are worth."""
         return self.noise.information * (len(white) - self.discrepancy.dropped(self.recordings))

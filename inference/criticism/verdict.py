@@ -129,7 +129,7 @@ def has_misfit(e: Evidence) -> bool:
 
 
 #: Why a candidate is not the answer: what was asked of it and not met, in the order in which it is asked.
-Objection = Literal["invisible", "chance", "zero", "little", "held-out", "worse"]
+Objection = Literal["invisible", "chance", "zero", "little", "held-out"]
 
 
 def objection(e: Evidence, candidate: Candidate) -> Objection | None:
