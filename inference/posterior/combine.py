@@ -195,8 +195,7 @@ def shared_parameter(name: str, paths: Sequence[Path], posteriors: Sequence[Phys
     space, edges = ParameterSpace((range_of_all,)), _edges()
     values, widths = space.from_unit(0.5 * (edges[1:] + edges[:-1])[:, None])[:, 0], np.diff(edges)
     density = np.stack([_density(p, path, name, values, widths) for p, path in zip(posteriors, paths, strict=True)])
-    with np.errstate(divide="ignore"):
-        log_density = np.log(density)
+    log_density = np.log(np.maximum(density, np.finfo(float).tiny))
     log_factor, product = _product(log_density, widths)
     rows = [space.from_unit(_quantiles(d, edges, LEVELS)[:, None])[:, 0] for d in (*density, product)]
     drawn = _quantiles(product, edges, (np.arange(DRAWS) + 0.5) / DRAWS)
@@ -231,10 +230,6 @@ def _product(log_density: FloatArray, widths: FloatArray) -> tuple[float, FloatA
     """Natural logarithm of the Bayes factor of one value for all ``(K, M)``, and the normalised product ``(M,)``."""
     total = log_density.sum(axis=0)
     top = float(total.max())
-    if not np.isfinite(top):
-        raise InputError(
-            "no value is allowed by all of these studies, so there is none to tell together; combine fewer of them"
-        )
     product = np.exp(total - top)
     area = float(product @ widths)
     return top + math.log(area), np.asarray(product / area)

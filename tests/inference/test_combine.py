@@ -91,6 +91,8 @@ def test_it_says_whether_one_value_does_for_all_and_whose_does_not() -> None:
     assert found.agree is False and found.odd == Path("1.toml")
     assert "do not use what they say together; without 1.toml the others agree" in found.text()
     assert together(a, odd).odd is None
+    sure = together(*(gaussian(m, 0.01) for m in (0.0, 0.01, 2.0)))  # densities are zero where the others have theirs
+    assert sure.agree is False and sure.odd == Path("2.toml") and "more than 10000 times" in sure.text()
 
 
 def test_it_says_when_a_bound_of_the_priors_cuts_them_off() -> None:
