@@ -13,6 +13,9 @@ from ..polish import Objective, Polished
 STEP = 0.1
 #: A coefficient that does nothing then is moved this far, or to the farther end of its range.
 FAR_STEP = 0.9
+#: Where none does anything without the others (water, by how much there is and how far it reaches), all are moved so
+#: far.
+JOINT_STEP = 0.5
 #: No solution is nearer to a face of the unit cube.
 _EDGE = 0.01
 
@@ -69,7 +72,7 @@ class Look:
 
 
 def look_at(name: str, objective: Objective, plain: Polished) -> Look:
-    """Move every coefficient of ``name`` a little, the parameters staying at the plain fit.
+    """Move every coefficient of ``name`` a little, the parameters staying at the plain fit; all if that does nothing.
 
     Args:
         name: of the effect.
@@ -91,9 +94,16 @@ def look_at(name: str, objective: Objective, plain: Polished) -> Look:
         for k, row in zip(idle, objective.many(moved), strict=True):
             if row is not None:
                 columns[:, k] = (row - plain.white) / steps[k]
+    responses = columns * steps
+    if not columns.any() and len(zero) > 1:
+        steps = np.where(1.0 - zero >= zero, JOINT_STEP, -JOINT_STEP)
+        row = objective.many(np.concatenate([plain.unit, zero + steps])[None])[0]
+        if row is not None:
+            responses = (row - plain.white)[:, None]
+            columns = responses / (len(zero) * steps)  # each its part, so that all together give what was seen
     jacobian = np.hstack([plain.jacobian, columns])
     at, rss = least_square(start, plain.white, jacobian)
-    reach = float(np.max(np.linalg.norm(columns * steps, axis=0)) / np.sqrt(plain.rss))
+    reach = float(np.max(np.linalg.norm(responses, axis=0)) / np.sqrt(plain.rss))
     return Look(name, space, start, plain.white, jacobian, at, rss, float(np.abs(steps).max()), reach)
 
 

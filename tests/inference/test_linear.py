@@ -5,7 +5,7 @@ import pytest
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
-from muslin.inference.criticism.linear import STEP, least_square, look_at
+from muslin.inference.criticism.linear import JOINT_STEP, STEP, least_square, look_at
 from muslin.inference.criticism.where import _shortest
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, Polished
@@ -82,3 +82,28 @@ def test_what_does_nothing_at_first_is_moved_further() -> None:
     assert look.responds and look.step > 0.3
     nothing = Slip(2.0, 10.0)
     assert not look_at("slip", nothing, nothing.plain()).responds
+
+
+class Wet(Slip):
+    """Water moves by the product of how much there is and how far it reaches."""
+
+    def __init__(self, size: float) -> None:
+        super().__init__(0.0, size)
+        more = (Parameter("slip.extent", "1", -0.25, 0.75),)
+        self.space = ParameterSpace(tuple(self.space) + more)
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return super().many([(u[0], u[1] * (u[2] - 0.25)) for u in units])
+
+
+def test_coefficients_that_do_nothing_alone_are_moved_together() -> None:
+    objective = Wet(10.0)
+    plain = Polished(np.array([0.5]), objective.noise, objective.stiff[:, None], np.eye(1), 50.0)
+    look = look_at("slip", objective, plain)
+    assert look.responds and look.step == JOINT_STEP
+    together = np.array([0.5, JOINT_STEP, 0.25 + JOINT_STEP])
+    (seen,) = objective.many(together[None])
+    np.testing.assert_allclose(plain.white + look.jacobian @ (together - look.start), seen)
+    assert look.reach == pytest.approx(np.linalg.norm(seen - plain.white) / np.sqrt(plain.rss))
+    nothing = Wet(0.0)
+    assert not look_at("slip", nothing, plain).responds
