@@ -15,7 +15,7 @@ _LARGEST_EMPTINESS = 1000
 
 
 def read_csv(path: Path) -> list[RawTake]:
-    """One take for every name in the column ``recording``, or one unnamed take.
+    """One take for every name in the column ``recording``, or one unnamed take; all have the points of the whole file.
 
     A point that has no row at a time was not seen then.
 
@@ -29,10 +29,12 @@ def read_csv(path: Path) -> list[RawTake]:
         groups.setdefault(row.cells.get("recording", "").strip(), []).append(row)
     if "recording" in table.columns and "" in groups:
         raise InputError(f"{path}, line {groups[''][0].line}: recording is empty; give every row the name of its take")
-    return [_take(table, rows, name or None) for name, rows in groups.items()]
+    # one order for all takes: the point that a take shows first may be another in each
+    points = _ordered(list(dict.fromkeys(row.cells["point"].strip() for row in table.rows)))
+    return [_take(table, rows, name or None, points) for name, rows in groups.items()]
 
 
-def _take(table: Table, rows: Sequence[Row], name: str | None) -> RawTake:
+def _take(table: Table, rows: Sequence[Row], name: str | None, names: Sequence[str]) -> RawTake:
     axes = ("x", "y", "z") if "z" in table.columns else ("x", "y")
     times = [table.number(row, "time") for row in rows]
     last: dict[str, tuple[float, int]] = {}
@@ -47,7 +49,7 @@ def _take(table: Table, rows: Sequence[Row], name: str | None) -> RawTake:
                 f"{before:g} s of line {line}; sort the rows, and give each take its own name in a column 'recording'"
             )
         last[point] = (time, row.line)
-    order = {point: k for k, point in enumerate(_ordered(list(last)))}
+    order = {point: k for k, point in enumerate(names)}
     clock, frame = np.unique(times, return_inverse=True)
     size = len(clock) * len(order)
     if size > 1_000_000 and size > _LARGEST_EMPTINESS * len(rows):

@@ -120,14 +120,24 @@ def test_grippers_that_cannot_be(tmp_path: Path) -> None:
 
 def test_csv_with_gaps_and_several_takes(tmp_path: Path) -> None:
     text = "time,point,x,y,z,recording\n0,10,1,2,3,a\n0,9,4,5,6,a\n0.1,10,,,,a\n0.1,9,7,8,9,a\n\n"
-    text += "0,0,1,1,1,b\n1,0,2,2,2,b\n"
+    text += "0,9,1,1,1,b\n1,9,2,2,2,b\n"
     a, b = import_file(csv(tmp_path, text))
     assert (a.name, b.name) == ("a", "b")
     assert a.series.points[:, 0].tolist() == [[4, 5, 6], [7, 8, 9]]
     assert a.series.points[0, 1].tolist() == [1, 2, 3]
     assert np.isnan(a.series.points[1, 1]).all()
-    assert b.series.points.shape == (2, 1, 3)
+    assert b.series.points[:, 0].tolist() == [[1, 1, 1], [2, 2, 2]]
     assert "leave --name out" in complaint(tmp_path / "track.csv", name="x")
+
+
+def test_a_point_of_a_csv_is_the_same_in_every_take(tmp_path: Path) -> None:
+    """Whichever of them a take shows first, or does not show at all."""
+    text = "time,point,x,y,z,recording\n0,base,1,1,1,a\n0,tip,2,2,2,a\n1,base,1,1,1,a\n1,tip,2,2,2,a\n"
+    text += "0,tip,2,2,2,b\n1,base,1,1,1,b\n1,tip,2,2,2,b\n0,tip,2,2,2,c\n1,tip,2,2,2,c\n"
+    a, b, c = import_file(csv(tmp_path, text))
+    assert a.series.points[1].tolist() == b.series.points[1].tolist() == [[1, 1, 1], [2, 2, 2]]
+    assert np.isnan(b.series.points[0, 0]).all()
+    assert np.isnan(c.series.points[:, 0]).all() and c.series.points[1, 1].tolist() == [2, 2, 2]
 
 
 def test_csv_grouped_by_point_and_with_semicolons(tmp_path: Path) -> None:
