@@ -12,7 +12,7 @@ import typer
 
 from ..core.dataset import Dataset, DatasetNote, cropped
 from ..core.errors import InputError
-from ..core.importing import ImportOptions, import_file
+from ..core.importing import ImportOptions, import_together
 from ..core.measurement import Measurement, Recording
 from ..core.measurement_store import save_measurement
 from ..core.pose_span import uncovered
@@ -218,11 +218,8 @@ def _of_files(
 ) -> list[Recording]:
     """What the files hold; ``each`` are options that are given once, or once a file."""
     with _notes_said():
-        return [
-            r
-            for file, own in zip(files, per_file(each, len(files)), strict=True)
-            for r in import_file(file, replace(options, **own))
-        ]
+        told = per_file(each, len(files))
+        return import_together([(file, replace(options, **own)) for file, own in zip(files, told, strict=True)])
 
 
 @contextmanager

@@ -50,4 +50,5 @@ def read_c3d(path: Path) -> list[RawTake]:
         raise InputError(f"{path} is cut short: it announces {declared} frames, but holds {len(points)}; copy it again")
     if not (np.isfinite(rate) and rate > 0):
         raise InputError(f"{path}: the frame rate is {rate:g} Hz; it must be positive")
-    return [RawTake(np.arange(len(points)) / rate, points, unit=unit or None)]
+    named = tuple(labels) if len(labels) == points.shape[1] else ()
+    return [RawTake(np.arange(len(points)) / rate, points, unit=unit or None, labels=named)]

@@ -60,7 +60,7 @@ def _take(table: Table, rows: Sequence[Row], name: str | None, names: Sequence[s
     points: FloatArray = np.full((len(clock), len(order), len(axes)), np.nan)
     for row, k in zip(rows, frame, strict=True):
         points[k, order[row.cells["point"].strip()]] = [table.number(row, axis, gap=True) for axis in axes]
-    return RawTake(clock, points, name=name)
+    return RawTake(clock, points, name=name, labels=tuple(names))
 
 
 def _ordered(names: list[str]) -> list[str]:

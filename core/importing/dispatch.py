@@ -1,6 +1,6 @@
 """From a file to recordings: choose the reader, then put units, axes and names right."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,17 +27,42 @@ FORMATS: dict[str, Callable[[Path], list[RawTake]]] = {".npz": read_npz, ".c3d":
 
 
 def import_file(path: Path, options: ImportOptions | None = None) -> list[Recording]:
-    """Recordings of one file; only a CSV can hold several. What is taken as not seen is said with a warning.
+    """Recordings of one file, see :func:`import_together`; only a CSV can hold several."""
+    return import_together([(path, options or ImportOptions())])
+
+
+def import_together(files: Iterable[tuple[Path, ImportOptions]]) -> list[Recording]:
+    """Recordings of one object. What is taken as not seen or put in another order is said with a warning.
+
+    Points that have the same names in several files are put in the order of the first of these.
 
     Args:
-        path: of the file; its suffix says the format.
-        options: what a person says about it.
+        files: path and what a person says about it; the suffix says the format.
 
     Raises:
-        MissingFileError: the file, or the one of the gripper poses, does not exist.
-        InputError: the file cannot be right; says where and what would be.
+        MissingFileError: a file, or one of the gripper poses, does not exist.
+        InputError: a file cannot be right; says where and what would be.
     """
-    options = options or ImportOptions()
+    takes = [(take, path, options) for path, options in files for take in _read(path, options)]
+    orders: dict[frozenset[str], tuple[tuple[str, ...], Path]] = {}
+    for take, path, _ in takes:
+        orders.setdefault(frozenset(take.labels), (take.labels, path))
+    return [
+        _recording(_in_order(take, path, *orders[frozenset(take.labels)]), path, options)
+        for take, path, options in takes
+    ]
+
+
+def _in_order(take: RawTake, path: Path, order: tuple[str, ...], first: Path) -> RawTake:
+    """The take with its points in the ``order`` of those in the file ``first``, which has the same names."""
+    if take.labels == order or len(set(order)) < len(order) or len(take.labels) != len(order):
+        return take  # of points that share a name nothing tells which is which
+    note(f"{path}: its points, by their names, are put in the order of {first}")
+    return replace(take, points=take.points[:, [take.labels.index(label) for label in order]], labels=order)
+
+
+def _read(path: Path, options: ImportOptions) -> list[RawTake]:
+    """The takes of a file as they are in it."""
     _check_file(path)
     if options.up not in TURNS:
         raise InputError(f"--up must be x, y or z, but is {options.up!r}")
@@ -50,7 +75,7 @@ def import_file(path: Path, options: ImportOptions | None = None) -> list[Record
     takes = reader(path)
     if len(takes) > 1 and options.name is not None:
         raise InputError(f"{path} holds {len(takes)} recordings with names of their own; leave --name out")
-    return [_recording(take, path, options) for take in takes]
+    return takes
 
 
 def _check_file(path: Path) -> None:

@@ -28,6 +28,7 @@ class RawTake:
         points: ``(T, P, 2 or 3)`` [unit]; NaN where a point was not seen.
         unit, correspondence, name, motion, load: what the file says, None if it says nothing.
         gripper: poses that the file holds, if any.
+        labels: the name of every point; none where the file does not name them.
     """
 
     time: FloatArray
@@ -38,3 +39,4 @@ class RawTake:
     motion: str | None = None
     load: float | None = None
     gripper: RawGripper | None = None
+    labels: tuple[str, ...] = ()

@@ -1,3 +1,5 @@
+import warnings
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -5,16 +7,18 @@ import pytest
 from published import published
 
 from muslin.core.errors import InputError
-from muslin.core.importing import ImportOptions, import_file
+from muslin.core.importing import ImportOptions, import_file, import_together
 
 ezc3d = pytest.importorskip("ezc3d", reason="C3D needs ezc3d: pip install 'muslin[mocap]'")
 
 
-def write_c3d(path: Path, points: np.ndarray, unit: str = "mm", rate: float = 50.0) -> Path:
+def write_c3d(
+    path: Path, points: np.ndarray, unit: str = "mm", rate: float = 50.0, labels: Sequence[str] | None = None
+) -> Path:
     frames, count = points.shape[:2]
     file = ezc3d.c3d()
     file["parameters"]["POINT"]["RATE"]["value"] = [rate]
-    file["parameters"]["POINT"]["LABELS"]["value"] = [f"M{k}" for k in range(count)]
+    file["parameters"]["POINT"]["LABELS"]["value"] = list(labels or [f"M{k}" for k in range(count)])
     file["parameters"]["POINT"]["UNITS"]["value"] = [unit]
     data = np.ones((4, count, frames))
     data[:3] = np.moveaxis(points, (0, 1, 2), (2, 1, 0))
@@ -43,6 +47,22 @@ def test_units_rate_and_gaps(tmp_path: Path) -> None:
 def test_a_unit_that_is_not_known(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unit 'furlong' is not known; units are m, cm, mm, px"):
         import_file(write_c3d(tmp_path / "a.c3d", sample(), unit="furlong"))
+
+
+def test_markers_are_the_same_in_all_files_by_their_names(tmp_path: Path) -> None:
+    points = sample()
+    first = write_c3d(tmp_path / "a.c3d", points, labels=["tip", "middle", "clamp"])
+    other = write_c3d(tmp_path / "b.c3d", points[:, [2, 0, 1]], labels=["clamp", "tip", "middle"])
+    with pytest.warns(UserWarning, match=r"b\.c3d: its points, by their names, are put in the order of .*a\.c3d"):
+        a, b = import_together([(path, ImportOptions()) for path in (first, other)])
+    np.testing.assert_array_equal(a.series.points, b.series.points)
+    np.testing.assert_allclose(a.series.points, points / 1000, atol=1e-7)
+    twice = write_c3d(tmp_path / "d.c3d", points, labels=["tip", "tip", "clamp"])
+    again = write_c3d(tmp_path / "e.c3d", points, labels=["clamp", "tip", "tip"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        c, d = import_together([(path, ImportOptions()) for path in (twice, again)])
+    np.testing.assert_array_equal(c.series.points, d.series.points)  # nothing tells the two apart
 
 
 def test_a_file_cut_short(tmp_path: Path) -> None:
