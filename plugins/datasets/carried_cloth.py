@@ -15,6 +15,7 @@ from ...core.motion import Motion, inverse, multiply, rotate
 from ...core.series import PointSeries
 from .carried_turns import carried_turns
 from .grid_faults import lost_cloth
+from .metres import check_metres
 
 #: Orientation of the hand, w x y z, in which the cloth hangs in the x-z plane, its columns from low to high x.
 HOME = np.array([0.0, 0.5**0.5, 0.5**0.5, 0.0])
@@ -65,6 +66,7 @@ def _recording(path: Path, name: str) -> Recording:
     time = shaped(data["t"], (len(mesh),), "t", path)
     if mesh.shape[1] != mesh.shape[2] or mesh.shape[1] < 2:
         raise InputError(f"{path}: mesh must be (T, n, n, 3) with n from 2 up, but is {mesh.shape}")
+    check_metres(mesh, "the nodes of mesh", path)
     grid = np.where(np.isfinite(mesh), mesh, np.nan)[:, :, ::-1].transpose(0, 2, 1, 3)
     begun = _begun(time)
     lost = lost_cloth(grid)
@@ -86,6 +88,7 @@ def _recording(path: Path, name: str) -> Recording:
     if "tcp_t" not in data:
         raise InputError(f"{path} has tcp but no tcp_t (K,), the times of its poses [s]; add it, or leave tcp out")
     hand = shaped(data["tcp"], (None, 7), "tcp", path)
+    check_metres(hand[:, :3], "the positions of tcp", path)
     clock, hand = _rising(shaped(data["tcp_t"], (len(hand),), "tcp_t", path), hand, path)
     done = camera_lag(time[whole], middle, clock, hand[:, :3])
     if done is None:

@@ -12,6 +12,7 @@ from ...core.measurement import Recording
 from ...core.motion import Motion
 from ...core.series import PointSeries
 from ...core.subsets import stacked, thinned
+from .metres import check_metres
 
 #: A point counts as one of the sheet if so many share its neighbourhood of three cells a side [m].
 CROWD, CELL = 12, 0.01
@@ -52,10 +53,16 @@ def among_many(points: FloatArray) -> BoolArray:
     near = np.flatnonzero(((points > low - REACH) & (points < high + REACH)).all(axis=1))
     cells = np.floor(points[near] / CELL).astype(np.int64)
     cells -= cells.min(axis=0) - 1
-    counts = np.zeros(cells.max(axis=0) + 2, np.int64)
-    np.add.at(counts, tuple(cells.T), 1)
-    steps = np.array(list(np.ndindex(3, 3, 3))) - 1
-    out[near] = np.sum([counts[tuple((cells + step).T)] for step in steps], axis=0) >= CROWD
+    sides = cells.max(axis=0) + 2
+    numbers, own, counts = np.unique(
+        np.ravel_multi_index(tuple(cells.T), sides), return_inverse=True, return_counts=True
+    )
+    around = np.zeros(len(numbers), np.int64)
+    for step in np.array(list(np.ndindex(3, 3, 3))) - 1:
+        beside = numbers + step @ np.array([sides[1] * sides[2], sides[2], 1])
+        at = np.minimum(np.searchsorted(numbers, beside), len(numbers) - 1)
+        around += np.where(numbers[at] == beside, counts[at], 0)
+    out[near] = around[own] >= CROWD
     return out
 
 
@@ -64,13 +71,16 @@ def _recording(path: Path, name: str) -> Recording:
     points = shaped(data["points"], (None, None, 3), "points", path)
     command = shaped(data["gripper_cmd"], (len(points), 3), "gripper_cmd", path)
     time = shaped(data["t"], (len(points),), "t", path)
+    check_metres(points, "points", path)
     if len(points) < SKIPPED + 2:
         raise InputError(f"{path}: {len(points)} frames are too few; the first {SKIPPED} are left out")
     frames = [frame[np.isfinite(frame).all(axis=1)] for frame in points[SKIPPED:]]
     crowded = [frame[among_many(frame)] for frame in frames]
     if not all(map(len, crowded)):
         k = SKIPPED + [len(frame) > 0 for frame in crowded].index(False)
-        raise InputError(f"{path}: frame {k} shows no sheet: no {CROWD} of its points lie together")
+        raise InputError(
+            f"{path}: frame {k} shows no sheet: no {CROWD} of its points lie together; are they in metres?"
+        )
     alone = sum(map(len, frames)) - sum(map(len, crowded))
     kept = stacked([thinned(frame, VOXEL, KEPT) for frame in crowded], KEPT)
     note(

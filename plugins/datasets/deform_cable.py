@@ -15,6 +15,7 @@ from ...core.motion import Motion
 from ...core.series import PointSeries
 from .carried_turns import carried_turns
 from .marker_faults import lost_frames, put_back, wrong_markers
+from .metres import check_metres
 
 #: Along this axis of its gripper the cable leaves it.
 _ALONG = np.array([1.0, 0.0, 0.0])
@@ -38,6 +39,7 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
         raise MissingFileError(f"there is no file {path}; name the .npz file of one cable")
     data = arrays(path, ("markers", "clamped", "fps", "names"))
     markers = shaped(data["markers"], (None, None, None, 3), "markers", path)
+    check_metres(markers, "markers", path)
     clamped = _clamped(shaped(data["clamped"], (4,), "clamped", path), markers.shape[2], path)
     fps = float(shaped(data["fps"], (), "fps", path))
     if not 0 < fps < np.inf:

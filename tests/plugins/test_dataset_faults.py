@@ -80,6 +80,19 @@ def test_a_cable_file_says_what_it_should_hold(tmp_path: Path, array: str, value
     assert said in complaint("deform-cable", save_cable(tmp_path / "c.npz", swinging_cable(), **{array: value}))
 
 
+def test_millimetres_are_not_taken_for_metres(tmp_path: Path) -> None:
+    cable = save_cable(tmp_path / "cable.npz", 1000 * swinging_cable())
+    assert "markers reach over 700 m, while this set is in metres" in complaint("deform-cable", cable)
+    made = carried(0.31, (0.0, 0.0, 0.0))
+    cloth = save_cloth(tmp_path / "cloth.npz", mesh=1000 * made["mesh"])
+    assert "the nodes of mesh reach over" in complaint("carried-cloth", cloth)
+    far = made["tcp"] * np.array([1000.0] * 3 + [1.0] * 4)
+    assert "the positions of tcp reach over" in complaint("carried-cloth", save_cloth(cloth, tcp=far))
+    sheet = np.random.default_rng(0).uniform(0.0, 300.0, (12, 3000, 3))
+    np.savez(tmp_path / "fold.npz", points=sheet, gripper_cmd=np.ones((12, 3)), t=0.1 * np.arange(12))
+    assert "points reach over" in complaint("cloth-cloud", tmp_path / "fold.npz")
+
+
 def test_two_takes_of_one_name_are_told(tmp_path: Path) -> None:
     path = save_cable(tmp_path / "c.npz", np.stack([swinging_cable()] * 2), ("1.pkl", "1.c3d"))
     assert "names must differ, but 1 is there more than once" in complaint("deform-cable", path)

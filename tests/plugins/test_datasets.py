@@ -173,9 +173,10 @@ def test_clouds_are_thinned_lose_what_stands_alone_and_skip_the_arm(tmp_path: Pa
     counts = np.histogram2d(*points[0, :, :2].T, bins=3, range=[[0, 0.3]] * 2)[0]
     assert counts.min() > 0.7 * 600 / 9  # every part of the sheet keeps its share
     assert "21 points that stand alone; kept 600 of 8000 points a frame" in said[0]
-    np.savez(tmp_path / "fold_x2.npz", points=10.0 * clouds, gripper_cmd=np.ones((12, 3)), t=time)
-    with pytest.raises(InputError, match="frame 5 shows no sheet: no 12 of its points lie together"):
-        read("cloth-cloud", tmp_path)
+    for unit in (10.0, 100.0):
+        np.savez(tmp_path / "fold_x2.npz", points=unit * clouds, gripper_cmd=np.ones((12, 3)), t=time)
+        with pytest.raises(InputError, match="frame 5 shows no sheet: no 12 of its points lie together; are they in m"):
+            read("cloth-cloud", tmp_path)
 
 
 def test_what_is_wrong_is_said(tmp_path: Path) -> None:
