@@ -8,6 +8,7 @@ import numpy as np
 from ...core.arrays import BoolArray, FloatArray
 from ...core.dataset import about, archives, arrays, chosen, note, shaped
 from ...core.errors import InputError
+from ...core.importing.zeros import unseen_zeros
 from ...core.measurement import Recording
 from ...core.motion import Motion
 from ...core.series import PointSeries
@@ -27,8 +28,9 @@ SKIPPED = 5
 def read_cloth_cloud(path: Path, takes: Sequence[str]) -> list[Recording]:
     """Takes from a folder of NPZ files, or one: ``points (T, P, 3)``, ``gripper_cmd (T, 3)`` [m], ``t (T,)`` [s].
 
-    Clouds have no correspondence; they are cut off near the table. Points that stand nearly alone are left out, and of
-    the others at most 600 a frame kept, evenly. The gripper is the command, which
+    Clouds have no correspondence; they are cut off near the table. Points that stand nearly alone are left out, those
+    that share 0, 0, 0, with which files are filled up, and frames that show no sheet; of
+    the others at most 600 a frame are kept, evenly. The gripper is the command, which
     the cloth's apex trails by 2 to 3 cm; its poses go from the first frame, the points from the sixth. Takes whose
     names differ in a trailing 2 alone are repeats.
 
@@ -72,20 +74,27 @@ def _recording(path: Path, name: str) -> Recording:
     command = shaped(data["gripper_cmd"], (len(points), 3), "gripper_cmd", path)
     time = shaped(data["t"], (len(points),), "t", path)
     check_metres(points, "points", path)
+    if (zeros := unseen_zeros(points, correspondence=False)).any():
+        note(f"{name}: {int(zeros.sum())} points at exactly 0, 0, 0 are taken as not seen")
+        points[zeros] = np.nan
     if len(points) < SKIPPED + 2:
         raise InputError(f"{path}: {len(points)} frames are too few; the first {SKIPPED} are left out")
     frames = [frame[np.isfinite(frame).all(axis=1)] for frame in points[SKIPPED:]]
     crowded = [frame[among_many(frame)] for frame in frames]
-    if not all(map(len, crowded)):
-        k = SKIPPED + [len(frame) > 0 for frame in crowded].index(False)
+    shown = np.array([len(frame) > 0 for frame in crowded])
+    if shown.sum() < 2:
         raise InputError(
-            f"{path}: frame {k} shows no sheet: no {CROWD} of its points lie together; are they in metres?"
+            f"{path}: frame {SKIPPED + int(np.argmin(shown))} shows no sheet: no {CROWD} of its points lie together, "
+            "as in nearly all frames; are they in metres?"
         )
+    if not shown.all():
+        note(f"{name}: left out {int((~shown).sum())} of {len(shown)} frames that show no sheet")
+    crowded = [frame for frame in crowded if len(frame)]
     alone = sum(map(len, frames)) - sum(map(len, crowded))
     kept = stacked([thinned(frame, VOXEL, KEPT) for frame in crowded], KEPT)
     note(
         f"{name}: left out the first {SKIPPED} frames, which show arm and gripper, and {alone} points that stand "
         f"alone; kept {np.isfinite(kept[..., 0]).sum(axis=1).mean():.0f} of {points.shape[1]} points a frame, evenly"
     )
-    series = PointSeries(time[SKIPPED:], kept, correspondence=False)
+    series = PointSeries(time[SKIPPED:][shown], kept, correspondence=False)
     return Recording(name, series, Motion.from_positions(time, command[:, None]), name.removesuffix("2"))

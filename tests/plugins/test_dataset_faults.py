@@ -173,6 +173,22 @@ def test_other_files_of_a_folder_are_left_out(tmp_path: Path) -> None:
         read("carried-cloth", tmp_path)
 
 
+def test_clouds_are_filled_up_with_zeros_and_may_miss_a_frame(tmp_path: Path) -> None:
+    clouds = np.random.default_rng(0).uniform(0.3, 0.6, (12, 4000, 3)) * (1.0, 1.0, 0.02)
+    arrays = {"gripper_cmd": np.ones((12, 3)), "t": 0.1 * np.arange(12)}
+    np.savez(tmp_path / "fold.npz", points=clouds, **arrays)
+    (whole,), _ = read("cloth-cloud", tmp_path / "fold.npz")
+    filled = np.concatenate([clouds, np.zeros((12, 100, 3))], axis=1)
+    filled[8] = 0.0
+    np.savez(tmp_path / "fold.npz", points=filled, **arrays)
+    (take,), notes = read("cloth-cloud", tmp_path / "fold.npz")
+    there = np.arange(7) != 3
+    np.testing.assert_array_equal(take.series.points, whole.series.points[there])
+    np.testing.assert_array_equal(take.series.time, whole.series.time[there])
+    assert notes[0] == "fold: 5200 points at exactly 0, 0, 0 are taken as not seen"
+    assert notes[1] == "fold: left out 1 of 7 frames that show no sheet"
+
+
 def test_a_clock_that_goes_back_is_told_with_its_file(tmp_path: Path) -> None:
     time = 0.1 * np.arange(12)
     time[7] = 0.2
