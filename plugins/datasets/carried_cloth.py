@@ -9,6 +9,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.dataset import about, archives, arrays, chosen, note, shaped
 from ...core.errors import InputError
+from ...core.importing.zeros import unseen_zeros
 from ...core.interpolation import interpolate
 from ...core.measurement import Recording
 from ...core.motion import Motion, inverse, multiply, rotate
@@ -68,6 +69,11 @@ def _recording(path: Path, name: str) -> Recording:
         raise InputError(f"{path}: mesh must be (T, n, n, 3) with n from 2 up, but is {mesh.shape}")
     check_metres(mesh, "the nodes of mesh", path)
     grid = np.where(np.isfinite(mesh), mesh, np.nan)[:, :, ::-1].transpose(0, 2, 1, 3)
+    nodes = grid.reshape(len(grid), grid.shape[1] * grid.shape[2], 3)
+    PointSeries(time, nodes)  # a clock that cannot be must not look as if hand and cloth were of two takes
+    if (zeros := unseen_zeros(nodes, correspondence=True)).any():
+        note(f"{name}: {int(zeros.sum())} nodes that jump to exactly 0, 0, 0 are taken as not seen")
+        grid[zeros.reshape(grid.shape[:3])] = np.nan
     begun = _begun(time)
     lost = lost_cloth(grid)
     if lost.any():

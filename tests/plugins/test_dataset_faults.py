@@ -118,6 +118,10 @@ def save_cloth(path: Path, **other: Any) -> Path:
         ({"tcp": np.full((120, 7), np.nan)}, "tcp holds 0 whole poses; at least 2 are needed"),
         ({"tcp": np.tile([0.0, 0, 0, 0, 0, 0, 1], (120, 1))}, "the cloth does not move as the robot's hand does"),
         ({"mesh": np.zeros((50, 5, 4, 3))}, "mesh must be (T, n, n, 3)"),
+        ({"mesh": np.zeros((0, 5, 5, 3)), "t": np.zeros(0)}, "a series needs at least 2 frames, but has 0"),
+        ({"t": 100.0 * np.arange(50)}, "time must be in seconds, is it in milliseconds?"),
+        ({"t": np.append(np.arange(49.0), np.nan)}, "time[49] is not a number"),
+        ({"t": -np.arange(50.0)}, "time must rise"),
     ],
 )
 def test_a_cloth_file_says_what_it_should_hold(tmp_path: Path, other: dict[str, Any], said: str) -> None:
@@ -141,6 +145,14 @@ def test_where_the_hand_rests_there_is_no_lag(tmp_path: Path) -> None:
     (take,), notes = read("carried-cloth", save_cloth(tmp_path / "a.npz", **still))
     np.testing.assert_array_equal(take.series.time, made["t"])
     assert notes == ["a: the hand rests, so how much the camera lags does not show; it is taken for 0 s"]
+
+
+def test_nodes_at_zero_were_not_seen(tmp_path: Path) -> None:
+    made = carried(0.31, (0.0, 0.0, 0.0))
+    made["mesh"][20:24, 1, 1] = 0.0
+    (take,), notes = read("carried-cloth", save_cloth(tmp_path / "a.npz", **made))
+    assert notes[0] == "a: 4 nodes that jump to exactly 0, 0, 0 are taken as not seen"
+    assert (~take.series.valid).sum() == 4 and (~take.series.valid[20:24]).sum() == 4
 
 
 def test_messages_of_the_robot_without_a_pose_are_left_out(tmp_path: Path) -> None:
