@@ -54,6 +54,8 @@ def chosen(takes: Sequence[str], known: Sequence[str], where: Path) -> list[str]
     Raises:
         InputError: one is not there, or asked for twice.
     """
+    if not known:
+        raise InputError(f"{where} holds no takes")
     for name in takes:
         if name not in known:
             more = f", and {len(known) - _TOLD} more" if len(known) > _TOLD else ""
@@ -84,14 +86,14 @@ def cropped(recording: Recording, start: float | None, stop: float | None) -> Re
 
 
 @contextmanager
-def about(path: Path) -> Iterator[None]:
-    """Say of what is wrong in this block in which file it is."""
+def about(place: Path | str) -> Iterator[None]:
+    """Say of what is wrong in this block in which file, or which part of a file, it is."""
     try:
         yield
     except InputError as error:
-        if str(path) in str(error):
+        if str(place) in str(error):
             raise
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{place}: {error}") from error
 
 
 def archives(path: Path, keys: Sequence[str]) -> dict[str, Path]:

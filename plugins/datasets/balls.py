@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.dataset import chosen, note
+from ...core.dataset import about, chosen, note
 from ...core.errors import MissingFileError
 from ...core.importing.table import Row, Table, read_table
 from ...core.measurement import Recording
@@ -41,12 +41,14 @@ def read_balls(path: Path, takes: Sequence[str]) -> list[Recording]:
 def _recording(table: Table, rows: Sequence[Row], name: str) -> Recording:
     time = np.array([table.number(row, "time_s") for row in rows])
     height = np.array([table.number(row, "height_m") for row in rows])
-    first = _first(time, height)
-    if first:
-        note(f"{name}: left out {first} of {len(time)} frames, in which the ball is still held")
-    points = np.full((len(time) - first, 1, 3), np.nan)
-    points[:, 0, 2] = height[first:]
-    return Recording(name, PointSeries(time[first:], points), motion=name.rsplit("-", 1)[0])
+    points = np.full((len(time), 1, 3), np.nan)
+    points[:, 0, 2] = height
+    with about(f"{table.path}, take {name!r}"):
+        PointSeries(time, points)  # two drops of one name must not pass for one that is held for long
+        first = _first(time, height)
+        if first:
+            note(f"{name}: left out {first} of {len(time)} frames, in which the ball is still held")
+        return Recording(name, PointSeries(time[first:], points[first:]), motion=name.rsplit("-", 1)[0])
 
 
 def _first(time: FloatArray, height: FloatArray) -> int:

@@ -45,8 +45,11 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
     if not 0 < fps < np.inf:
         raise InputError(f"{path}: fps must be above zero, but is {fps:g}; it is the number of frames a second")
     names = _names(data["names"], len(markers), path)
-    with about(path):
-        return [_recording(markers[names.index(n)], clamped, 1.0 / fps, n) for n in chosen(takes, names, path)]
+    made = []
+    for name in chosen(takes, names, path):
+        with about(f"{path}, take {name!r}"):
+            made.append(_recording(markers[names.index(name)], clamped, 1.0 / fps, name))
+    return made
 
 
 def _clamped(given: FloatArray, count: int, path: Path) -> IntArray:
@@ -88,18 +91,18 @@ def _recording(markers: FloatArray, clamped: IntArray, step: float, name: str) -
         told = _times(time[wrong.any(axis=1)])
         note(f"{name}: {int(wrong.sum())} markers left out in {int(wrong.any(axis=1).sum())} frames, at {told}")
     points = np.where(wrong[..., None], np.nan, markers)
-    return Recording(name, PointSeries(time, points), _grippers(time, points, clamped, name))
+    return Recording(name, PointSeries(time, points), _grippers(time, points, clamped))
 
 
-def _grippers(time: FloatArray, points: FloatArray, clamped: IntArray, name: str) -> Motion:
+def _grippers(time: FloatArray, points: FloatArray, clamped: IntArray) -> Motion:
     """Poses of both ends where all four clamped markers are seen, and those of a pair apart."""
     first, second, third, last = (points[:, c] for c in clamped)
     apart = np.stack([np.linalg.norm(second - first, axis=1), np.linalg.norm(third - last, axis=1)])
     good = (apart > 0).all(axis=0)  # a comparison with NaN is false
     if not good.any():
         raise InputError(
-            f"take {name!r}: in no frame are all four clamped markers ({', '.join(map(str, clamped))}) where they can "
-            "be, so there is no path of the grippers; leave it out"
+            f"in no frame are all four clamped markers ({', '.join(map(str, clamped))}) where they can be, so there is "
+            "no path of the grippers; leave it out: name the others with --take"
         )
     ends = []
     for outer, inner in ((first[good], second[good]), (last[good], third[good])):

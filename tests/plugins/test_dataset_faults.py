@@ -98,6 +98,30 @@ def test_two_takes_of_one_name_are_told(tmp_path: Path) -> None:
     assert "names must differ, but 1 is there more than once" in complaint("deform-cable", path)
 
 
+def test_a_take_that_cannot_be_is_named(tmp_path: Path) -> None:
+    blind = np.full((60, 8, 3), np.nan)
+    path = save_cable(tmp_path / "c.npz", np.stack([swinging_cable(), blind]), ("1.pkl", "2.pkl"))
+    assert "c.npz, take '2': every point is NaN" in complaint("deform-cable", path)
+    assert len(read("deform-cable", path, "1")[0]) == 1
+    none = save_cable(tmp_path / "none.npz", np.zeros((0, 60, 8, 3)), names=np.zeros(0, "U1"))
+    assert "none.npz holds no takes" in complaint("deform-cable", none)
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (["Ball,1,0,9", "Ball,1,1,4", "Ball,1,0,9", "Ball,1,1,4"], "take 'ball-1': time must rise"),
+        (["Ball,1,0,9"], "take 'ball-1': a series needs at least 2 frames"),
+        (["A/B,1,0,9", "A/B,1,1,4"], "take 'a/b-1': a recording needs a name without slashes"),
+        (["Ball,1,0,9", "Ball,1,1,"], "balls.csv, line 3: height_m must be a finite number"),
+    ],
+)
+def test_a_drop_that_cannot_be_is_named(tmp_path: Path, rows: list[str], said: str) -> None:
+    path = tmp_path / "balls.csv"
+    path.write_text("\n".join(["ball,drop,time_s,height_m", *rows]))
+    assert said in complaint("balls", path)
+
+
 def test_names_may_be_bytes(tmp_path: Path) -> None:
     path = save_cable(tmp_path / "c.npz", swinging_cable(), names=np.array([b"12.pkl"]))
     assert read("deform-cable", path)[0][0].name == "12"
