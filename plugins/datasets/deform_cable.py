@@ -1,5 +1,6 @@
 """Cables swung in free air by two robots, with motion capture: the DEFORM data."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -63,13 +64,13 @@ def _clamped(given: FloatArray, count: int, path: Path) -> IntArray:
 
 
 def _names(given: npt.NDArray[Any], takes: int, path: Path) -> list[str]:
-    """Names of the takes, without a suffix as of ``12.pkl``."""
+    """Names of the takes, without a suffix as of ``12.pkl``, which a number after a point is not."""
     if given.shape != (takes,) or given.dtype.kind not in "US":
         raise InputError(
             f"{path}: names must be one text for each of the {takes} takes of markers, but is of shape {given.shape} "
             f"and {given.dtype}"
         )
-    names = [str(n).rsplit(".", 1)[0] for n in given.astype(str)]
+    names = [re.sub(r"\.[A-Za-z]\w*$", "", str(n)) for n in given.astype(str)]
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
         raise InputError(f"{path}: names must differ, but {', '.join(twice)} is there more than once")

@@ -122,6 +122,11 @@ def test_a_drop_that_cannot_be_is_named(tmp_path: Path, rows: list[str], said: s
     assert said in complaint("balls", path)
 
 
+def test_a_number_after_a_point_is_no_suffix(tmp_path: Path) -> None:
+    path = save_cable(tmp_path / "c.npz", np.stack([swinging_cable()] * 3), ("0.25 m", "0.50 m", "slow.c3d"))
+    assert [r.name for r in read("deform-cable", path)[0]] == ["0.25 m", "0.50 m", "slow"]
+
+
 def test_names_may_be_bytes(tmp_path: Path) -> None:
     path = save_cable(tmp_path / "c.npz", swinging_cable(), names=np.array([b"12.pkl"]))
     assert read("deform-cable", path)[0][0].name == "12"
