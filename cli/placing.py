@@ -1,6 +1,5 @@
 """Where the measured points sit on the mesh, as far as the first frame tells."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +11,12 @@ from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.pose_span import uncovered
-from ..core.registry import REGISTRY
 from ..core.scenario import Scenario
 from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
 from ..core.study.objects import keep_points
+from .rope_start import may_start_measured, why_not_measured
 from .study_file import plan_table
 from .study_plan import Plan
 
@@ -29,9 +28,6 @@ _ELSEWHERE = 0.4
 _FEWEST_OF_A_LINE, _NARROW = 4, 0.02
 #: A point further than this share of the object's size from the mesh is probably in another frame.
 _FAR = 0.25
-#: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
-#: and the way from one to the next as long at most, over the shortest tree through them.
-_FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
 #: Noise below this share of how near a model is meant to come says nothing of the model.
 _FAR_BETTER = 0.1
 
@@ -66,9 +62,26 @@ def place_markers(plan: Plan, measured: Measurement, study: Path, body: Body, si
     """
     if plan.markers is not None and plan.markers != "nearest":
         return plan, []
+    if plan.markers is not None or sized or not may_start_measured(plan):
+        return _on_vertices(plan, measured, study, body)
     used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
-    if plan.markers is None and not sized and starts_measured(plan, used):
+    whys = {r.name: why for r in used if (why := why_not_measured(r, plan.points)) is not None}
+    if not whys:
         return _measured(plan, measured)
+    plan, remarks = _on_vertices(plan, measured, study, body)
+    told = [f"{name}: {why}" for name, why in whys.items() if why]
+    if told:
+        others = f" ({len(told) - 1} more as well)" if len(told) > 1 else ""
+        remarks.append(
+            f"warning: the rope hangs at the start, as long as [scenario] size says, as takes do not all show it from "
+            f"one gripper to the other; {told[0]}{others}"
+        )
+    return plan, remarks
+
+
+def _on_vertices(plan: Plan, measured: Measurement, study: Path, body: Body) -> tuple[Plan, list[str]]:
+    """The plan with markers on vertices, tied to the object, or anywhere on its surface."""
+    used = [measured[n] for n in (*plan.fit_on, *plan.hold_out)]
     count = len(plan.points) if plan.points is not None else used[0].series.points.shape[1]
     followed = all(r.series.correspondence for r in used) and used[0].series.unit == "m"
     if plan.markers is None and used[0].series.unit == "m" and not followed and count > len(body.vertices):
@@ -121,45 +134,6 @@ def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
             "bends"
         )
     return plan, remarks
-
-
-def starts_measured(plan: Plan, used: Sequence[Recording]) -> bool:
-    """Whether every take shows a rope from one gripper to the other in its first frame, marker by marker.
-
-    Then its length and its shape at the start are known, and need not be guessed by letting a rope of some length hang.
-    """
-    if plan.kind != "rope" or plan.mesh is not None or plan.grasp_points is not None:
-        return False
-    if "start-velocity" not in REGISTRY.get("simulator", plan.simulator).capabilities:
-        return False
-    return len(plan.held) == 2 and all(_from_end_to_end(r, plan.points) for r in used)
-
-
-def _from_end_to_end(recording: Recording, kept: list[int] | None) -> bool:
-    series, gripper = recording.series, recording.gripper
-    if not series.correspondence or series.unit != "m" or gripper is None or gripper.grippers != 2:
-        return False
-    first = series.points[0] if kept is None else series.points[0][kept]
-    if len(first) < _FEWEST_MARKERS or first.shape[1] != 3 or not np.isfinite(first).all():
-        return False
-    ends = gripper.at(series.time[:1])[0, :, :3]
-    steps = np.linalg.norm(np.diff(first, axis=0), axis=1)
-    near = np.linalg.norm(first[[0, -1]] - ends, axis=1) < _AT_THE_GRIPPER * steps.sum()
-    # the shortest tree through markers in their order is the rope itself; numbered some other way they jump to and fro
-    return bool(near.all() and (steps > 0).all() and steps.sum() < _IN_ORDER * _shortest_tree(first))
-
-
-def _shortest_tree(points: FloatArray) -> float:
-    """How long the shortest tree through ``points (P, 3)`` is [m], by Prim's algorithm."""
-    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
-    away, total = apart[0], 0.0
-    left = np.arange(len(points)) > 0
-    while left.any():
-        nearest = int(np.argmin(np.where(left, away, np.inf)))
-        total += away[nearest]
-        left[nearest] = False
-        away = np.minimum(away, apart[nearest])
-    return float(total)
 
 
 def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> tuple[Plan, list[str]]:

@@ -113,8 +113,18 @@ def test_a_rope_that_is_seen_far_better_than_it_is_modelled_is_held_to_less(
     assert ("come within 5 mm ([noise] sd)" in capsys.readouterr().out) == (near is not None)
 
 
-@pytest.mark.parametrize("fault", ["hidden", "out of order", "far from the grippers", "few"])
-def test_a_rope_that_is_not_seen_whole_hangs_at_the_start(tmp_path: Path, fault: str) -> None:
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("hidden", "one: marker 4 is not seen in its first frame; import it from a later --start"),
+        ("out of order", "one: its markers do not lead from the first gripper to the second one by one"),
+        ("far from the grippers", "name those that do with --points (1 more as well)"),
+        ("few", ""),
+    ],
+)
+def test_a_rope_that_is_not_seen_whole_hangs_at_the_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, said: str
+) -> None:
     points, motion = from_end_to_end(5 if fault == "few" else 9)
     if fault == "out of order":
         points[[2, 6]] = points[[6, 2]]
@@ -131,6 +141,8 @@ def test_a_rope_that_is_not_seen_whole_hangs_at_the_start(tmp_path: Path, fault:
     path = tmp_path / "s.toml"
     assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
     assert read_config(path).scenario.start is None
+    printed = capsys.readouterr().out
+    assert said in printed and ("the rope hangs at the start" in printed) == bool(said)
 
 
 def test_the_material_of_a_scenario_is_written(tmp_path: Path) -> None:

@@ -1,0 +1,61 @@
+"""Whether takes of a rope show it from one gripper to the other, so that they can start through their markers."""
+
+import numpy as np
+
+from ..core.arrays import FloatArray
+from ..core.measurement import Recording
+from ..core.registry import REGISTRY
+from .study_plan import Plan
+
+#: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
+#: and the way from one to the next as long at most, over the shortest tree through them.
+_FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
+
+
+def may_start_measured(plan: Plan) -> bool:
+    """Whether the object is a rope between two grippers, and the simulator can start it in any shape, in motion."""
+    if plan.kind != "rope" or plan.mesh is not None or plan.grasp_points is not None:
+        return False
+    return len(plan.held) == 2 and "start-velocity" in REGISTRY.get("simulator", plan.simulator).capabilities
+
+
+def why_not_measured(recording: Recording, kept: list[int] | None) -> str | None:
+    """Why a take cannot start through its markers, and what to do; nothing if these are not meant to; None if it can.
+
+    It can where its first frame shows the rope from one gripper to the other, marker by marker. Then its length and its
+    shape at the start are known, and need not be guessed by letting a rope of some length hang.
+    """
+    series, gripper = recording.series, recording.gripper
+    if not series.correspondence or series.unit != "m" or gripper is None or gripper.grippers != 2:
+        return ""
+    numbers = list(range(series.points.shape[1])) if kept is None else kept
+    first = series.points[0][numbers]
+    if len(first) < _FEWEST_MARKERS or first.shape[1] != 3:
+        return ""
+    seen = np.isfinite(first).all(axis=1)
+    if not seen.all():
+        hidden = numbers[int(np.argmin(seen))]
+        return (
+            f"marker {hidden} is not seen in its first frame; import it from a later --start, leave the marker out "
+            "with --points, or the take with --fit-on and --hold-out"
+        )
+    ends = gripper.at(series.time[:1])[0, :, :3]
+    steps = np.linalg.norm(np.diff(first, axis=0), axis=1)
+    near = np.linalg.norm(first[[0, -1]] - ends, axis=1) < _AT_THE_GRIPPER * steps.sum()
+    # the shortest tree through markers in their order is the rope itself; numbered some other way they jump to and fro
+    if near.all() and (steps > 0).all() and steps.sum() < _IN_ORDER * _shortest_tree(first):
+        return None
+    return "its markers do not lead from the first gripper to the second one by one; name those that do with --points"
+
+
+def _shortest_tree(points: FloatArray) -> float:
+    """How long the shortest tree through ``points (P, 3)`` is [m], by Prim's algorithm."""
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    away, total = apart[0], 0.0
+    left = np.arange(len(points)) > 0
+    while left.any():
+        nearest = int(np.argmin(np.where(left, away, np.inf)))
+        total += away[nearest]
+        left[nearest] = False
+        away = np.minimum(away, apart[nearest])
+    return float(total)
