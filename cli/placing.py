@@ -205,6 +205,8 @@ def doubtful_starts(problem: Problem) -> list[str]:
                 f"warning: {name} starts {apart:.2g} m away from where the model puts the object; check --up, the "
                 "unit, the gripper poses (x y z, then the quaternion w x y z), the scenario and the size"
             )
+        if scenario.body.kind == "solid":
+            remarks += _beside(recording, scenario)
         if scenario.body.kind == "cloth" and _on_a_line(recording.series.points[0]):
             remarks.append(
                 f"warning: all points of {name} start on one line; if they are those of a rope, give its length with "
@@ -226,6 +228,21 @@ def _apart(recording: Recording, scenario: Scenario) -> float:
     if not series.correspondence or scenario.sampled:
         return float(np.linalg.norm(np.median(first[seen], axis=0) - np.median(vertices, axis=0)))
     return float(np.sqrt(np.mean(np.sum((first - scenario.markers @ vertices)[seen] ** 2, axis=1))))
+
+
+def _beside(recording: Recording, scenario: Scenario) -> list[str]:
+    """A warning where a marker starts far from the object: one that is tied to it goes along, wherever it is."""
+    first, vertices = recording.series.points[0], scenario.start_vertices()
+    seen = np.isfinite(first).all(axis=1)
+    if not recording.series.correspondence or not seen.any() or first.shape[1] != 3:
+        return []
+    away = np.where(seen, np.linalg.norm(first[:, None] - vertices[None], axis=2).min(axis=1), 0.0)
+    if away.max() <= _FAR * float(np.ptp(vertices, axis=0).max()):
+        return []
+    return [
+        f"warning: {recording.name}: point {int(away.argmax())} is {away.max():.2g} m from the object at the start; "
+        "leave it out with --points if it is not on the object, or check the size, --up and the unit"
+    ]
 
 
 def _on_a_line(points: FloatArray) -> bool:

@@ -234,8 +234,10 @@ def bound_markers(vertices: FloatArray, points: FloatArray, neighbours: int = 12
         local = np.vstack([vertices[near].T - p[:, None], np.ones(len(near))])
         weights[m, near] = np.linalg.pinv(local) @ np.array([0.0, 0.0, 0.0, 1.0])
         if not np.allclose(weights[m] @ vertices, p, atol=1e-6):
+            away = float(np.linalg.norm(vertices[near[0]] - p))
             raise InputError(
-                f"marker {m} at {np.round(p, 4).tolist()} m cannot be tied to the vertices near it, which lie in "
-                "one plane; give marker vertices in the study's [scenario] table instead"
+                f"marker {m} at {np.round(p, 4).tolist()} m, {away:.2g} m from the object, cannot be tied to the "
+                "vertices near it, which lie in one plane; check the size of the object, --up and the unit, or give "
+                "marker vertices in [scenario] markers"
             )
     return weights

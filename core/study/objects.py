@@ -179,7 +179,10 @@ def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Reco
                 f"recording {recording.name!r}: marker {int(np.argmin(seen))} is not seen in the first frame, "
                 "so it cannot be bound to the object; start the recording later or give [scenario.markers] vertices"
             )
-        return bound_markers(scenario.start_vertices(), points[0])
+        try:
+            return bound_markers(scenario.start_vertices(), points[0])
+        except InputError as error:
+            raise InputError(f"recording {recording.name!r}: {error}") from error
     if isinstance(choice, list):
         weights = marker_weights(count, np.array(choice, np.int64))
         if recording.series.correspondence and len(weights) != points.shape[1]:

@@ -68,3 +68,15 @@ def test_a_size_in_millimetres_puts_all_markers_on_one_vertex(
     )
     (tmp_path / "s.toml").unlink()
     assert LINE not in told(tmp_path, capsys, hanging, upright, "--scenario", "swing", "--size", "1")
+
+
+def test_a_marker_that_is_not_on_a_solid_is_remarked_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It would go along with the object, so that nothing looks wrong."""
+    corners = preset("beam").scenario().start_vertices()[[0, 5, -1]] + np.array([0.0, 0.0, 1.0])
+    far = np.concatenate([corners, corners[:1] + 0.4])
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    said = told(tmp_path, capsys, far, still, "--scenario", "beam")
+    assert "warning: one: point 3 is 0.6" in said and "leave it out with --points if it is not on the object" in said
+    (tmp_path / "s.toml").unlink()
+    assert "from the object" not in told(tmp_path, capsys, far, still, "--scenario", "beam", "--points", "0,1,2")
+    assert "recording 'one': marker 0" in told(tmp_path, capsys, corners * 40.0, still, "--scenario", "beam", "--force")
