@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import FloatArray
+from ..dataset import note
 from ..errors import InputError, MuslinError
 from .raw import RawGripper, RawTake
 
@@ -28,6 +29,8 @@ _KNOWN = (
 def read_npz(path: Path) -> list[RawTake]:
     """One take. Arrays of Python objects are refused: reading them could run code from the file.
 
+    Arrays of other names are not read, which is said with a warning, as a name may be misspelt.
+
     Raises:
         InputError: not such a file, or an array with another shape or type; says which.
     """
@@ -44,6 +47,8 @@ def read_npz(path: Path) -> list[RawTake]:
     for name in ("time", "points"):
         if name not in arrays:
             raise InputError(f"{path} has no array {name!r}; it needs {_KEYS}, and has {', '.join(found) or 'nothing'}")
+    if others := [name for name in found if name not in _KNOWN]:
+        note(f"{path}: not read: {', '.join(others)}; what is read are {', '.join(_KNOWN)}")
     time, points = _numbers(arrays["time"], "time", path), _numbers(arrays["points"], "points", path)
     if time.ndim != 1 or points.ndim != 3 or points.shape[2] not in (2, 3) or len(time) != len(points):
         raise InputError(f"{path} needs {_KEYS}, but has time {time.shape} and points {points.shape}")

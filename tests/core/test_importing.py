@@ -3,6 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from muslin.core.dataset import DatasetNote
 from muslin.core.errors import InputError, MissingFileError, MuslinError
 from muslin.core.importing import ImportOptions, import_file
 
@@ -50,6 +51,11 @@ def test_npz_as_it_is(tmp_path: Path) -> None:
     assert (r.name, r.motion, r.load, r.series.correspondence, r.series.unit) == ("fling 1", "fling", 0.05, False, "m")
     assert r.gripper is not None
     assert r.gripper.poses[0, 0].tolist() == [0, 0, 0, 1, 0, 0, 0]
+
+
+def test_arrays_that_are_not_read_are_told(tmp_path: Path) -> None:
+    with pytest.warns(DatasetNote, match=r"take\.npz: not read: gripper_poses; what is read are time, .*gripper_pose,"):
+        import_file(npz(tmp_path, gripper_poses=np.zeros((11, 1, 3))))
 
 
 def test_what_a_person_says_wins(tmp_path: Path) -> None:
