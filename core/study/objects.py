@@ -84,6 +84,11 @@ def build_scenario(
     body = _in_gripper_frame(given, table.frame, motion, float(recording.series.time[0]))
     start: StartShape | None = base.start if table.mesh is None else None
     grasps = grasps_of(table, given)
+    if recording.gripper is not None and motion.grippers < len(grasps):
+        raise InputError(
+            f"{table.name!r} holds the object with {len(grasps)} grippers, but recording {recording.name!r} has poses "
+            f"of {motion.grippers}; import the poses of all, or take a scenario that holds it with fewer"
+        )
     if table.straight_rest:
         held = body.vertices[grasps[0]] if grasps else body.vertices
         start = GivenShape(body.vertices, float(body.measures.sum()), held.mean(axis=0))

@@ -55,6 +55,11 @@ def complaint(folder: Path, points: int = 5, gripper: Motion | None = None, **sc
     return str(caught.value)
 
 
+def test_poses_of_too_few_grippers_are_told_with_their_recording(folder: Path) -> None:
+    said = complaint(folder, 41, Motion.still(1), name="cable")
+    assert "'cable' holds the object with 2 grippers, but recording 'a' has poses of 1; import the poses of all" in said
+
+
 def test_a_mesh_of_ones_own(folder: Path) -> None:
     problem = built(folder, 5, name="swing", mesh="sheet.obj", mesh_scale=2.0, grasp_points=[[-0.2, 0, 0]])
     scenario = problem.scenarios["a"]
