@@ -18,6 +18,7 @@ from ..core.measurement_store import save_measurement
 from ..core.pose_span import uncovered
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS
+from ..core.series import seconds
 from .console import command, next_step, say
 from .per_file import once_or_each, per_file
 from .videos import all_videos, import_videos
@@ -265,7 +266,7 @@ def summary(recording: Recording) -> str:
     extent = " x ".join(f"{s:.3g}" for s in span)
     which = "" if len(measured) == 3 else f" ({', '.join('xyz'[a] for a in measured)})"
     parts = [
-        f"{recording.name}: {frames} frames from {series.time[0]:g} to {series.time[-1]:g} s",
+        f"{recording.name}: {frames} frames from {seconds(series.time[0])} to {seconds(series.time[-1])} s",
         f"{count} points{'' if series.correspondence else ' without correspondence'}, {seen:.1%} seen",
         f"within {extent} {series.unit}{which}",
     ]

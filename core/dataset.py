@@ -14,6 +14,7 @@ from numpy.lib.npyio import NpzFile
 from .arrays import FloatArray
 from .errors import InputError, MissingFileError
 from .measurement import Recording
+from .series import seconds
 
 #: So many names of takes are told where one is unknown.
 _TOLD = 8
@@ -79,7 +80,7 @@ def cropped(recording: Recording, start: float | None, stop: float | None) -> Re
     if keep.sum() < 2:
         raise InputError(
             f"recording {recording.name!r}: fewer than 2 frames lie between start and stop; it goes from "
-            f"{time[0]:g} to {time[-1]:g} s"
+            f"{seconds(time[0])} to {seconds(time[-1])} s"
         )
     points = recording.series.points[keep]
     return replace(recording, series=replace(recording.series, time=time[keep], points=points))

@@ -4,6 +4,7 @@ import numpy as np
 
 from .measurement import Recording
 from .motion import Motion
+from .series import seconds
 
 #: Poses that are missing for so many frames, or for no longer than they are apart, are just those to come.
 _FRAMES = 3.0
@@ -24,13 +25,13 @@ def uncovered(recording: Recording) -> list[str]:
     out = []
     if first - time[0] > few and _moves(gripper, first, first + _WHILE):
         out.append(
-            f"the gripper poses begin at {first:g} s, the points at {time[0]:g} s; the gripper is taken to stand still "
-            f"until then; if it did not, import from --start {first:g}"
+            f"the gripper poses begin at {seconds(first)} s, the points at {seconds(time[0])} s; the gripper is taken "
+            f"to stand still until then; if it did not, import from --start {seconds(first)}"
         )
     if time[-1] - last > few and _moves(gripper, last, last - _WHILE):
         out.append(
-            f"the gripper poses end at {last:g} s, the points go on to {time[-1]:g} s; the gripper is taken to stand "
-            f"still from there; if it did not, import up to --stop {last:g}"
+            f"the gripper poses end at {seconds(last)} s, the points go on to {seconds(time[-1])} s; the gripper is "
+            f"taken to stand still from there; if it did not, import up to --stop {seconds(last)}"
         )
     return out
 

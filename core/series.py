@@ -11,6 +11,11 @@ from .errors import InputError
 PointUnit = Literal["m", "px"]
 
 
+def seconds(time: float) -> str:
+    """A time as it is told and can be given back, also of a clock that counts from 1970."""
+    return f"{round(time, 4):.15g}"
+
+
 @dataclass(frozen=True, eq=False)
 class PointSeries:
     """Points over time, in metres or pixels.

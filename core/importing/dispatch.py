@@ -11,7 +11,7 @@ from ..errors import InputError, MissingFileError
 from ..lens import Lens
 from ..measurement import Recording
 from ..motion import Motion
-from ..series import PointSeries
+from ..series import PointSeries, seconds
 from .axes import TURNS, turned
 from .c3d import read_c3d
 from .csv_points import read_csv
@@ -101,8 +101,8 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
         points = lens.undistorted_points(points)
     if gripper is not None and (gripper.times[-1] < take.time[0] or gripper.times[0] > take.time[-1]):
         raise InputError(
-            f"{where}: the gripper poses go from {gripper.times[0]:g} to {gripper.times[-1]:g} s, the points from "
-            f"{take.time[0]:g} to {take.time[-1]:g} s; give both on the same clock"
+            f"{where}: the gripper poses go from {seconds(gripper.times[0])} to {seconds(gripper.times[-1])} s, the "
+            f"points from {seconds(take.time[0])} to {seconds(take.time[-1])} s; give both on the same clock"
         )
     try:
         series = PointSeries(take.time, points, si, correspondence)
@@ -147,6 +147,6 @@ def _cropped(take: RawTake, options: ImportOptions, where: str) -> RawTake:
     if keep.sum() < 2:
         raise InputError(
             f"{where}: fewer than 2 frames lie between {low:g} and {high:g} s; "
-            f"the file goes from {np.nanmin(take.time):g} to {np.nanmax(take.time):g} s"
+            f"the file goes from {seconds(np.nanmin(take.time))} to {seconds(np.nanmax(take.time))} s"
         )
     return replace(take, time=take.time[keep], points=take.points[keep])

@@ -1,5 +1,7 @@
 """Poses that begin after the points or end before them: said where the gripper moves there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,14 @@ def test_a_gripper_that_is_last_seen_in_motion() -> None:
 def test_a_gripper_that_is_first_seen_in_motion() -> None:
     [said] = uncovered(along(np.linspace(0.4, 1.8, 141), np.linspace(0.0, 0.1, 141)))
     assert said.startswith("the gripper poses begin at 0.4 s, the points at 0 s;") and said.endswith("--start 0.4")
+
+
+def test_a_clock_that_counts_from_1970_is_told_so_that_it_can_be_given_back() -> None:
+    epoch = 1.7e9
+    series = PointSeries(POINTS.time + epoch, POINTS.points)
+    take = along(np.linspace(0.4, 1.8, 141) + epoch, np.linspace(0.0, 0.1, 141))
+    [said] = uncovered(replace(take, series=series))
+    assert said.startswith("the gripper poses begin at 1700000000.4 s") and said.endswith("--start 1700000000.4")
 
 
 @pytest.mark.parametrize(
