@@ -151,6 +151,11 @@ def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> t
         total, seen = total + np.nan_to_num(apart), seen + np.isfinite(apart)
     if not np.all(seen):
         lost = int(np.argmin(np.all(np.asarray(seen) > 0, axis=1)))
+        if not any(r.series.valid[:, lost].any() for r in problem.recordings.values()):
+            raise InputError(
+                f"point {lost} is in no frame of any recording seen with all its coordinates, so it cannot be placed "
+                "on the mesh; leave it out with --points, or give --markers with vertex numbers"
+            )
         raise InputError(
             f"point {lost} is not seen in the first frame of any recording, so it cannot be placed on the mesh; "
             "import from a later --start, leave it out with --points, or give --markers with vertex numbers"

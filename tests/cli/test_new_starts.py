@@ -80,3 +80,14 @@ def test_a_marker_that_is_not_on_a_solid_is_remarked_on(tmp_path: Path, capsys: 
     (tmp_path / "s.toml").unlink()
     assert "from the object" not in told(tmp_path, capsys, far, still, "--scenario", "beam", "--points", "0,1,2")
     assert "recording 'one': marker 0" in told(tmp_path, capsys, corners * 40.0, still, "--scenario", "beam", "--force")
+
+
+def test_a_point_that_lacks_a_coordinate_throughout_is_not_said_to_come_later(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As the height of a ball, of which a later start shows no more."""
+    height = np.array([[np.nan, np.nan, 1.0]])
+    still = np.array([1.0, 0.0, 0.0, 0.0])
+    said = told(tmp_path, capsys, height, still, "--scenario", "drop")
+    assert "point 0 is in no frame of any recording seen with all its coordinates" in said and "--start" not in said
+    assert "wrote" in told(tmp_path, capsys, height, still, "--scenario", "drop", "--markers", "0")
