@@ -12,6 +12,8 @@ from .raw import RawGripper
 from .table import read_table
 from .units import METRES
 
+#: So many poses that are farther apart than this [s] are on a clock of milliseconds.
+_SEVERAL, _LONG = 10, 5.0
 #: How far the norm of a quaternion may be from one before it is taken for something else.
 QUATERNION_TOLERANCE = 0.05
 
@@ -78,6 +80,11 @@ def to_motion(raw: RawGripper, unit: str, up: str, where: str) -> Motion:
     if not (np.isfinite(poses).all() and np.isfinite(raw.times).all()):
         broken = ~(np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(raw.times))
         raise InputError(f"{where}: gripper pose {int(np.argmax(broken))} holds a value that is not a finite number")
+    if len(poses) >= _SEVERAL and (step := float(np.median(np.diff(raw.times)))) > _LONG:
+        raise InputError(
+            f"{where}: gripper poses are {step:g} s apart in the middle; their time must be in seconds, is it in "
+            "milliseconds?"
+        )
     positions = poses[..., :3] * METRES.get(unit, 1.0)
     full = np.concatenate([positions, _quaternions(poses, where)], axis=2)
     try:

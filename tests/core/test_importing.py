@@ -196,6 +196,14 @@ def test_gripper_poses_beside_a_csv(tmp_path: Path) -> None:
         import_file(track, ImportOptions(gripper=tmp_path / "nix.csv"))
 
 
+def test_gripper_poses_in_milliseconds_are_not_taken_for_seconds(tmp_path: Path) -> None:
+    """They begin as the points do, so that the gripper would hardly have moved."""
+    late = npz(tmp_path, gripper_pose=np.zeros((11, 1, 3)), gripper_time=1000 * TIME)
+    assert "gripper poses are 100 s apart in the middle; their time must be in seconds" in complaint(late)
+    rare = npz(tmp_path, gripper_pose=np.zeros((2, 1, 3)), gripper_time=np.array([0.0, 60.0]))
+    assert import_file(rare)[0].gripper is not None
+
+
 def test_files_that_are_not_what_they_say(tmp_path: Path) -> None:
     with pytest.raises(MissingFileError, match="no file"):
         import_file(tmp_path / "nix.npz")
