@@ -90,6 +90,7 @@ def short(record: dict[str, Any]) -> dict[str, Any]:
     kept |= {f"true_{k}": truth[k] for k in ("effects", "rivals", "coefficients", "misfit", "left") if k in truth}
     kept |= {k: d[k] for k in ("verdict", "effects", "error") if k in d}
     kept |= {"first": d["candidates"][0]["name"] if d else None}
+    kept |= {"explained": d["evidence"]["explained"]} if d else {}
     kept |= {k: record[k] for k in ("simulations", "seconds", "processor_seconds", "failed", "left_out") if k in record}
     return kept | {"baselines": {n: b["name"] or b["held_out"] for n, b in record.get("baselines", {}).items()}}
 

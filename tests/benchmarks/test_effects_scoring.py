@@ -125,7 +125,9 @@ def test_bars_intervals_and_rivals_are_in_the_table() -> None:
 def test_what_the_results_keep_of_a_case() -> None:
     made = record("known", "tied", ("hem", "wind"), ("wind",))
     made["case"] |= {"seed": 3, "role": "a", "correlated": False, "dropouts": True}
+    made["diagnosis"]["evidence"] = {"explained": 0.97}
     kept = short(made)
+    assert kept["explained"] == 0.97
     assert (kept["verdict"], kept["effects"], kept["true_effects"]) == ("tied", ["hem", "wind"], ("wind",))
     assert kept["first"] == "hem" and kept["failed"] is None
     assert "wind (5.0 sd)" in told(made) and "tied: hem, wind" in told(made)
