@@ -20,6 +20,8 @@ SIGNIFICANT = 4.0
 MARGIN = 10.0
 #: ... and by more than this share of what the best one leaves unexplained.
 SHARE_LEFT = 0.5
+#: A rival that explains less than is asked is one still if it explains this share of what the best one does.
+ALMOST = 0.9
 #: It must take away this share of the excess variance on held-out motions ...
 HELD_OUT_SHARE = 0.2
 #: ... where there is more of it than this share of the noise variance.
@@ -166,7 +168,8 @@ def decide(e: Evidence) -> Decision:
 def _rivals(e: Evidence, candidate: Candidate, best: Candidate) -> bool:
     """Is it so near to the best that the data cannot tell them, though it may explain a little less than asked?"""
     why = objection(e, candidate)
-    stands = why is None or (why == "little" and e.better_held_out(candidate))
+    near = e.explained(candidate) >= ALMOST * e.explained(best)
+    stands = why is None or (why == "little" and near and e.better_held_out(candidate))
     return stands and e.behind(candidate, best) < MARGIN + SHARE_LEFT * e.left(best)
 
 
