@@ -58,7 +58,7 @@ def test_a_rival_just_below_what_is_asked_is_a_rival_still() -> None:
     assert decide(evidence(9 * COUNT, above, candidate("damping", 2.8 * COUNT, held_out=0.010))).verdict == "named"
     assert decide(evidence(9 * COUNT, above, candidate("damping", 2.8 * COUNT, coefficient=0.0))).verdict == "named"
     # of a misfit of a thousand, what the best leaves is far more than any difference in log likelihood
-    vast = evidence(1400 * COUNT, candidate("slip", 30 * COUNT), candidate("offset", 750 * COUNT))
+    vast = evidence(1400 * COUNT, candidate("slip", 30 * COUNT), candidate("offset", 750 * COUNT, sd=1e-5))
     vast = replace(vast, noise_error=0.03)
     assert decide(vast) == Decision("named", ("slip",))
 
