@@ -132,7 +132,7 @@ def _outdone(first: Stage, pairs: list[Pair]) -> bool:
         return False
     e, best = first.evidence, pairs[0].both
     rivals = [first.chosen, *(p.both for p in pairs if named & set(p.names))]
-    return min(e.behind(rival, best) for rival in rivals) > MARGIN + SHARE_LEFT * e.left(best)
+    return not any(e.level(rival, best) for rival in rivals)
 
 
 def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Findings | None:
@@ -168,11 +168,10 @@ def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pai
     beside = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in others}
     order = sorted(beside, key=lambda n: beside[n].rss)
     e, ahead = stage.evidence, beside[order[0]]
-    margin = MARGIN + SHARE_LEFT * e.left(ahead)
     # one that is behind where it was fitted, and ahead where it was not, is not ruled out
     near = [
         n for n in order
-        if e.behind(beside[n], ahead) < margin or beside[n].held_out_white <= ahead.held_out_white
+        if e.level(beside[n], ahead) or beside[n].held_out_white <= ahead.held_out_white
     ]  # fmt: skip
     if len(near) > 1:
         rivals = tuple(((n, second.name), beside[n]) for n in near)

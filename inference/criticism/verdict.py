@@ -20,8 +20,6 @@ SIGNIFICANT = 4.0
 MARGIN = 10.0
 #: ... and by more than this share of what the best one leaves unexplained.
 SHARE_LEFT = 0.5
-#: A rival that explains less than is asked is one still if it explains this share of what the best one does.
-ALMOST = 0.9
 #: It must take away this share of the excess variance on held-out motions ...
 HELD_OUT_SHARE = 0.2
 #: ... where there is more of it than this share of the noise variance.
@@ -115,6 +113,16 @@ class Evidence:
         """What a candidate leaves beyond what noise may [noise variances]."""
         return max(0.0, candidate.rss - self.count - self.chance)
 
+    def level(self, candidate: Candidate, best: Candidate) -> bool:
+        """Is a candidate so near to the ``best`` one that the data cannot tell them?
+
+        By the likelihood of noise, or by what the best leaves beyond noise, in squares as that is: the model's own
+        errors may be as much of it as the difference is.
+        """
+        left = self.left(best)
+        within = left > 0.0 and candidate.rss - best.rss < MARGIN + SHARE_LEFT * left
+        return within or self.behind(candidate, best) < MARGIN
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -168,9 +176,8 @@ def decide(e: Evidence) -> Decision:
 def _rivals(e: Evidence, candidate: Candidate, best: Candidate) -> bool:
     """Is it so near to the best that the data cannot tell them, though it may explain a little less than asked?"""
     why = objection(e, candidate)
-    near = e.explained(candidate) >= ALMOST * e.explained(best)
-    stands = why is None or (why == "little" and near and e.better_held_out(candidate))
-    return stands and e.behind(candidate, best) < MARGIN + SHARE_LEFT * e.left(best)
+    stands = why is None or (why == "little" and e.better_held_out(candidate))
+    return stands and e.level(candidate, best)
 
 
 def _moved(candidate: Candidate) -> bool:
