@@ -135,14 +135,15 @@ def _result(
     for c in sorted(e.candidates, key=lambda c: c.rank):
         # of effects that were named together, what they are together
         coefficients = surely.get(c.name, c).coefficients_of(c.name)
+        doubt = found.doubt if found.doubt is not None and found.doubt.effect == c.name else None
         rows.append(
             {
                 "name": c.name,
                 "coefficients": {k: {"mean": m, "sd": s, "unit": u} for k, (m, s, u) in coefficients.items()},
-                "explained": found.doubted.get(c.name, e.explained(c)),
+                "explained": e.explained(c) if doubt is None else doubt.explained,
                 "z": e.z(c),
                 "behind": e.behind(c, e.nearest),
-                "objection": "little" if c.name in found.doubted else first.objection(c),
+                "objection": first.objection(c) if doubt is None else doubt.objection,
                 "held_out_before": e.held_out_plain if held else None,
                 "held_out_after": e.held_out(c) if held else None,
                 "held_out_shows": c.shown_held_out if held else None,

@@ -1,7 +1,6 @@
 """One effect after the other: forward while something is left, in pairs where one alone is not enough, and back."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,13 +9,28 @@ from .candidate import Candidate
 from .pairs import Pair, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import EXPLAINS, MARGIN, SHARE_LEFT, Decision, Evidence, Verdict
+from .verdict import MARGIN, SHARE_LEFT, Decision, Evidence, Objection, Verdict, short_of_a_name
 from .work import Work
 
 #: Effects that one diagnosis may name.
 MOST_EFFECTS = 3
 #: Beside the lead of a pair as many candidates are tried as second effects, those that promise most.
 PARTNERS = 8
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why an effect that seemed to be the answer is not, by the numerics as they are where it fits.
+
+    Args:
+        effect: its name.
+        explained: share of the excess misfit, there.
+        objection: what it lacks.
+    """
+
+    effect: str
+    explained: float
+    objection: Objection
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +48,7 @@ class Findings:
         rest: what was decided with the named ones in the model; None where that was not looked into.
         rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
         together: the two effects that left least where nothing was named, if any were tried.
-        doubted: what one effect explains where it fits, if that is less than it seemed and too little for its name.
+        doubt: of the one effect that had a name before it was looked at where it fits.
     """
 
     verdict: Verdict
@@ -46,7 +60,7 @@ class Findings:
     rest: Decision | None = None
     rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
     together: Pair | None = None
-    doubted: Mapping[str, float] = field(default_factory=dict)
+    doubt: Doubt | None = None
 
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
@@ -68,14 +82,16 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
 
 
 def confirmed(found: Findings, joint: Evidence) -> Findings:
-    """No name for one effect that explains too little by the numerics as they are where it fits.
+    """No name for one effect that lacks something by the numerics as they are where it fits.
 
     The stage that named it knew those of the model without it, which was bent far off to make up for what is missing.
     """
-    explained = joint.explained(joint.nearest)
-    if found.verdict != "named" or len(found.effects) > 1 or explained >= EXPLAINS:
+    if found.verdict != "named" or len(found.effects) > 1:
         return found
-    return Findings("none", (), found.first, found.first, found.after, doubted={found.after.name: explained})
+    if (why := short_of_a_name(joint, joint.nearest)) is None:
+        return found
+    doubt = Doubt(found.after.name, joint.explained(joint.nearest), why)
+    return Findings("none", (), found.first, found.first, found.after, doubt=doubt)
 
 
 def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings:
@@ -146,7 +162,7 @@ def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Find
     if stage.decision.verdict != "named":
         return None
     joint = work.jointly(stage.chosen, first.plain)
-    if joint.explained(joint.nearest) < EXPLAINS:
+    if short_of_a_name(joint, joint.nearest) is not None:
         return None
     named = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
     return _forward(work, names, _without_idle(work, named), pairs)

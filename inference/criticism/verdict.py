@@ -144,16 +144,17 @@ Objection = Literal["invisible", "chance", "zero", "little", "held-out"]
 
 def objection(e: Evidence, candidate: Candidate) -> Objection | None:
     """What speaks against a candidate by itself; None where nothing does."""
-    asked: tuple[tuple[Objection, bool], ...] = (
-        ("chance", e.z(candidate) >= SIGNIFICANT),
-        ("zero", _moved(candidate)),
-        ("little", e.explained(candidate) >= EXPLAINS),
-        ("held-out", e.better_held_out(candidate)),
-    )
-    failed = [name for name, met in asked if not met]
-    if failed and failed[0] in ("chance", "zero") and not candidate.visible:
-        return "invisible"
-    return failed[0] if failed else None
+    why: Objection | None = "chance" if e.z(candidate) < SIGNIFICANT else None if _moved(candidate) else "zero"
+    if why is None:
+        return short_of_a_name(e, candidate)
+    return why if candidate.visible else "invisible"
+
+
+def short_of_a_name(e: Evidence, candidate: Candidate) -> Objection | None:
+    """What a candidate that is there for sure lacks to be the answer; None where it lacks nothing."""
+    if e.explained(candidate) < EXPLAINS:
+        return "little"
+    return None if e.better_held_out(candidate) else "held-out"
 
 
 def decide(e: Evidence) -> Decision:

@@ -26,18 +26,24 @@ def hidden_effects() -> list[str]:
 
 
 def wider() -> list[str]:
-    """The benchmark of hidden effects on its test seeds: every figure that has a bar."""
+    """The benchmark of hidden effects on its test seeds: every figure that has a bar, beside what baselines reach."""
     content = json.loads((RESULTS / "effects.json").read_text())
-    lines = ["| on the test seeds | value | cases | 95 % interval | bar |", "|---|---|---|---|---|"]
-    for f in content["figures"]:
-        if not f["bar"] or not f["count"]:
-            continue
+    asked = [f for f in content["figures"] if f["bar"] and f["count"]]
+    rivals = list(dict.fromkeys(name for f in asked for name in f["rivals"] or ()))
+    heads = ["on the test seeds", "value", "cases", "95 % interval", "bar", *(f"`{name}`" for name in rivals)]
+    lines = [_row(heads), "|---" * len(heads) + "|"]
+    for f in asked:
         is_share = f["low"] is not None
-        value = shown(f["value"], is_share)
         interval = f"{100 * f['low']:.1f} to {100 * f['high']:.1f} %" if is_share else ""
         met = "met" if f["met"] else "**missed**"
-        lines.append(f"| {f['name']} | {value} | {f['count']} | {interval} | {f['bar']}, {met} |")
+        theirs = [shown((f["rivals"] or {}).get(name), is_share) for name in rivals]
+        cells = [f["name"], shown(f["value"], is_share), str(f["count"]), interval, f"{f['bar']}, {met}", *theirs]
+        lines.append(_row(cells))
     return lines
+
+
+def _row(cells: list[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def materials() -> list[str]:

@@ -16,7 +16,7 @@ from muslin.inference.criticism.caveats import further
 from muslin.inference.criticism.linear import Look
 from muslin.inference.criticism.pairs import Pair
 from muslin.inference.criticism.stage import Stage
-from muslin.inference.criticism.stepwise import Findings, confirmed, find
+from muslin.inference.criticism.stepwise import Doubt, Findings, confirmed, find
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.polish import Polished
 
@@ -195,16 +195,28 @@ def test_second_effects_are_looked_at_where_they_were_in_a_pair_and_alone(paired
     assert paired[1]["tilt"] == pytest.approx(np.array([[0.5, 0.3, 0.7], [0.5, 0.5, 0.5]]))
 
 
-def test_a_name_stands_only_if_it_explains_enough_where_it_fits() -> None:
+@pytest.mark.parametrize(
+    "left, held_out, doubt",
+    [
+        (2.4, 0.003, None),
+        (3.2, 0.003, Doubt("tilt", pytest.approx(0.73, abs=0.01), "little")),  # type: ignore[arg-type]
+        (1.0, 0.0095, Doubt("tilt", 1.0, "held-out")),
+    ],
+)
+def test_a_name_stands_only_if_nothing_speaks_against_it_where_it_fits(
+    left: float, held_out: float, doubt: Doubt | None
+) -> None:
     first = first_stage({"tilt": 1.2 * COUNT, "wind": 6 * COUNT})
     found = Findings("named", ("tilt",), first, first, first.chosen)
-    enough, little = (evidence(9 * COUNT, candidate("tilt", left * COUNT)) for left in (2.4, 3.2))
-    assert confirmed(found, enough) is found
-    doubted = confirmed(found, little)
-    assert (doubted.verdict, doubted.effects, doubted.after.name) == ("none", (), "tilt")
-    assert doubted.doubted == {"tilt": pytest.approx(0.73, abs=0.01)}
-    for other in (replace(found, verdict="tied"), replace(found, effects=("tilt", "wind"))):
-        assert confirmed(other, little) is other
+    joint = evidence(9 * COUNT, candidate("tilt", left * COUNT, held_out=held_out))
+    told = confirmed(found, joint)
+    assert told.doubt == doubt
+    if doubt is None:
+        assert told is found
+    else:
+        assert (told.verdict, told.effects, told.after.name) == ("none", (), "tilt")
+        for other in (replace(found, verdict="tied"), replace(found, effects=("tilt", "wind"))):
+            assert confirmed(other, joint) is other
 
 
 @pytest.mark.parametrize("names, rest", [(["drag"], Decision("none", ())), (["drag", "lag"], None)])
