@@ -271,6 +271,19 @@ def test_the_command_line_says_what_was_found_and_adds_a_law(tmp_path: Path) -> 
     assert "not both" in muslin("add", "air-drag", study.path, "--law", path)
     assert "alone" in muslin("add", "air-drag")
     assert "has a law already" in muslin("add", "--law", path, tmp_path / "study2.toml", "-o", tmp_path / "3.toml")
+    assert not (tmp_path / "3.toml").exists()
+
+
+def test_what_a_law_left_unexplained_is_added_to_it(tmp_path: Path) -> None:
+    """Muslin unknown looks beyond the terms that a study has, so what it finds is no law of its own."""
+    study = fitted_study(tmp_path, None)
+    add_law(study, law_file(tmp_path, linear_drag={"mean": 2.0, "sd": 0.1, "unit": "1/s"}), tmp_path / "study2.toml")
+    path = law_file(tmp_path, acceleration_y={"mean": 1.0, "sd": 0.1, "unit": "m/s2"})
+    assert "wrote" in muslin("add", "--law", path, tmp_path / "study2.toml", "-o", tmp_path / "3.toml")
+    problem = Study.load(tmp_path / "3.toml").problem
+    assert set(problem.space.names) == {"stretch_stiffness", "law.linear_drag", "law.acceleration_y"}
+    assert problem.fixed["law.dry_drag"] == 0.0
+    assert set(Study.load(tmp_path / "study2.toml").problem.space.names) == {"stretch_stiffness", "law.linear_drag"}
 
 
 def test_the_force_is_drawn() -> None:

@@ -83,6 +83,8 @@ def law_effect(path: Path) -> dict[str, float | ParameterTable]:
 def add_law(study: Study, law: Path, output: Path | None = None, *, overwrite: bool = False) -> Study:
     """A study of the same model with the law of a file, its coefficients inferred.
 
+    Where the study has a law already, what was still missing with it is added to that.
+
     Args:
         study: to start from.
         law: file of ``muslin unknown --json``.
@@ -90,9 +92,20 @@ def add_law(study: Study, law: Path, output: Path | None = None, *, overwrite: b
         overwrite: replace a file that is there.
 
     Raises:
-        InputError: the study has a law already, or the file holds none.
+        InputError: the study has these terms already, or the file holds none.
     """
     table = law_effect(law)
-    if LAW in study.config.effects:
-        raise InputError(f"{study.path} has a law already; start from the study that {law} was learned from")
-    return study.add(LAW, output, overwrite=overwrite, coefficients=table)
+    if LAW not in study.config.effects:
+        return study.add(LAW, output, overwrite=overwrite, coefficients=table)
+    known = study.config.effects[LAW]
+    new = {name: prior for name, prior in table.items() if prior != 0.0}
+    twice = [name for name in new if known.get(name) != 0.0]
+    if twice:
+        raise InputError(
+            f"{study.path} has a law already, with {' and '.join(twice)} in it; start from the study that {law} was "
+            "learned from"
+        )
+    config = study.config.model_copy(deep=True)
+    del config.effects[LAW]
+    without = Study(config, study.path, workers=study.workers, progress=study.progress)
+    return without.add(LAW, output, overwrite=overwrite, coefficients={**known, **new})
