@@ -19,10 +19,14 @@ from .search import Guess
 
 #: Name of the effect.
 LAW = "law"
+#: Name of the piece that pulls everything the same way.
+PUSH = "uniform acceleration"
 #: Least-squares evaluations for every guess, and for those that lead.
 FIRST_EVALUATIONS, MORE_EVALUATIONS = 12, 40
 #: Coefficients nearer to zero than this are dropped [standard deviations].
 CLEAR = 3.0
+#: A coefficient so near to an end of its range is held back by it [of the width].
+END = 0.005
 #: Most coefficients hold for any size; this one only says where others act, and is not dropped for being small.
 _PLACES = ("frequency",)
 
@@ -48,7 +52,8 @@ class RefittedLaw:
     @property
     def name(self) -> str:
         """What it is made of."""
-        return " + ".join(p.name for p in self.pieces if set(p.coefficients) & set(self.coefficients))
+        left = set(self.coefficients)
+        return " + ".join(dict.fromkeys(_called(p, left) for p in self.pieces if left & set(p.coefficients)))
 
     @property
     def rss(self) -> float:
@@ -60,6 +65,13 @@ class RefittedLaw:
         return tuple(n.removeprefix(f"{LAW}.") for n in self.space.names[self.base :])
 
     @property
+    def at_end(self) -> tuple[str, ...]:
+        """Names of the terms whose range ends before the recordings are content."""
+        unit = self.fit.unit[self.base :]
+        told = zip(self.coefficients, unit.tolist(), strict=True)
+        return tuple(n for n, u in told if n not in _PLACES and not END < u < 1 - END)
+
+    @property
     def terms(self) -> dict[str, tuple[float, float, str]]:
         """Mean, standard deviation and unit of every coefficient."""
         own = list(self.space)[self.base :]
@@ -69,6 +81,12 @@ class RefittedLaw:
             p.name.removeprefix(f"{LAW}."): (float(m), float(s * (p.high - p.low)), p.unit)
             for p, m, s in zip(own, mean, sd, strict=True)
         }
+
+
+def _called(piece: Piece, left: set[str]) -> str:
+    """The name of a piece of which these coefficients are left: without its stiffness a spring is a steady push."""
+    stiffness = piece.coefficients[0]
+    return PUSH if stiffness.startswith("spring") and stiffness not in left else piece.name
 
 
 def distinct(laws: list[RefittedLaw]) -> list[RefittedLaw]:

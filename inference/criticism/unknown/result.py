@@ -65,6 +65,7 @@ def law_table(case: Case, law: RefittedLaw) -> dict[str, Any]:
             name: {"mean": mean, "sd": sd, "unit": unit, "description": told[name].description}
             for name, (mean, sd, unit) in law.terms.items()
         },
+        "at_end": list(law.at_end),
         "parameters": {p.name: values[p.name] for p in list(law.space)[: law.base]},
         "explained": case.explained(law),
         "explained_held_out": case.explained_held_out(law),
@@ -123,6 +124,11 @@ def law_text(result: dict[str, Any]) -> tuple[str, ...]:
         f"  {n} = {t['mean']:.4g} ± {t['sd']:.2g} {t['unit']}: {t['description']}" for n, t in law["terms"].items()
     ]
     lines.append(f"This explains {_shares(law)}.")
+    if law["at_end"]:
+        lines.append(
+            f"The range that is searched ends at {' and '.join(law['at_end'])}: more is missing than the library "
+            "reaches to, and other terms may stand in for it."
+        )
     if result["verdict"] == "unchecked":
         lines.append("No recording is held out, so nothing has checked it: add one to [study] hold_out.")
     error = result["error"]
@@ -151,5 +157,7 @@ def _mean(force: dict[str, Any], key: str) -> float:
 
 def _shares(law: dict[str, Any]) -> str:
     held = law["explained_held_out"]
-    more = "" if held is None else f" and {100 * max(held, 0.0):.0f} % on held-out ones"
+    more = "" if held is None else f" and {100 * held:.0f} % on held-out ones"
+    if held is not None and held < 0:
+        more = ", but makes held-out ones worse"
     return f"{100 * law['explained']:.0f} % of the excess misfit on fitted recordings{more}"
