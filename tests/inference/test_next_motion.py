@@ -96,6 +96,20 @@ def test_a_ready_made_motion_within_the_limits_is_played_as_it_is() -> None:
     assert np.abs(played.poses[..., :3] - meant).max() < 0.004  # smoothed a little
 
 
+def test_a_controller_of_a_thousand_hertz_is_sent_as_large_a_motion_from_rest_to_rest() -> None:
+    """What is moving already as it begins, or still as it ends, is eased; else it would be made smaller with the step."""
+    limits = replace(OPEN, workspace=(-0.2, 0.2, 0.0, 0.2, -0.2, 0.3))
+    moving = replace(hanging(preset("fling").motion()), times=np.linspace(0.3, 0.9, 40))
+    for shape in known_shapes({"cut": moving}, limits):
+        if "hang" in shape.name:
+            continue
+        motions = [play(shape, ONE, replace(limits, rate=rate)) for rate in (100.0, 1000.0)]
+        coarse, fine = (float(np.ptp(m.poses[..., :3], axis=0).max()) for m in motions)
+        assert coarse > 0.025 and fine == pytest.approx(coarse, rel=0.05), shape.name
+        speed = np.linalg.norm(np.diff(motions[1].poses[:, 0, :3], axis=0), axis=1)
+        assert max(speed[0], speed[-1]) < 1e-3 * speed.max(), shape.name
+
+
 def test_no_turn_is_made_where_none_is_allowed() -> None:
     still = replace(LIMITS, turn=0.0, turn_speed=0.0)
     motion = play(Drawn(np.ones(Drawn.SIZE), still, 6.0), ONE, still)

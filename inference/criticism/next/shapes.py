@@ -17,8 +17,8 @@ from .limits import Limits
 
 #: Built-in scenarios whose commands need no particular object.
 READY_MADE = ("fling", "swing", "lift", "hang", "carry")
-#: Motions as they were recorded are smoothed with this standard deviation, so that they begin and end at rest [s].
-_SMOOTH = 0.03
+#: Motions as they were recorded are smoothed with this standard deviation, and begin and end at rest within this [s].
+_SMOOTH, _EASE = 0.03, 0.15
 #: The smallest amplitude worth shaking with [m]: it bounds the frequencies.
 _LEAST_AMPLITUDE = 0.005
 
@@ -222,10 +222,9 @@ class Known(Shape):
         away = np.where((away < 0) & (self.limits.low == 0) | (away > 0) & (self.limits.high == 0), 0.0, away)
         smooth = _SMOOTH / float(np.median(np.diff(times)))
         away, vectors = (gaussian_filter1d(v, smooth, axis=0, mode="nearest") for v in (away, vectors))
-        turns = _quaternions(turn_scale * (vectors - vectors[:1]))
-        return np.concatenate(
-            [start[None, :, :3] + scale * (away - away[:1]), multiply(turns, start[None, :, 3:])], axis=-1
-        )
+        away, vectors = _eased(times, away), _eased(times, vectors)
+        turns = _quaternions(turn_scale * vectors)
+        return np.concatenate([start[None, :, :3] + scale * away, multiply(turns, start[None, :, 3:])], axis=-1)
 
 
 def known_shapes(scenarios: Mapping[str, Scenario], limits: Limits) -> list[Known]:
@@ -256,6 +255,16 @@ def _minimum_jerk(share: FloatArray) -> FloatArray:
     """From 0 to 1 with minimal jerk (Flash and Hogan 1985)."""
     s = np.clip(share, 0.0, 1.0)
     return np.asarray(s**3 * (10 - 15 * s + 6 * s**2))
+
+
+def _eased(times: FloatArray, values: FloatArray) -> FloatArray:
+    """``values (K, G, 3)`` blended from zero and into the last one within :data:`_EASE`, and so at rest there.
+
+    A speed that is there at once is no rest, and the finer the samples are, the greater an acceleration it is. What
+    lies on one side of zero stays there, so a workspace that is closed on a side is kept.
+    """
+    begin, end = (_minimum_jerk(t / _EASE)[:, None, None] for t in (times - times[0], times[-1] - times))
+    return np.asarray(begin * (end * values + (1.0 - end) * values[-1:]))
 
 
 def _bump(share: FloatArray) -> FloatArray:
