@@ -89,6 +89,14 @@ def test_nothing_tells_twins_apart_and_that_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "motion.csv").exists()
 
 
+def test_a_motion_of_which_several_takes_would_do_is_proposed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("muslin.inference.criticism.next.step.HOPELESS", 0.8)
+    study = rope_study(tmp_path, LinearDrag(rate=1.0))
+    tied_drags(study)
+    found = propose(study, simulations=36, max_speed=0.2, max_acceleration=8.0, workspace=(-0.15, 0.15) * 3)
+    assert found.result["probability"] < 0.8 and found.result["takes"] > 1 and found.motion is not None
+
+
 @pytest.mark.slow
 def test_models_are_refitted_where_the_diagnosis_kept_none(tmp_path: Path) -> None:
     study = rope_study(tmp_path, LinearDrag(rate=1.0))
@@ -103,12 +111,6 @@ def test_models_are_refitted_where_the_diagnosis_kept_none(tmp_path: Path) -> No
         opening.Opening("tied", ("linear-drag",)),
     )
     assert count > 0 and rivals[0].values()["linear-drag.rate"] == pytest.approx(1.0, abs=0.25)
-
-
-def propose_noise(study: Study):  # type: ignore[no-untyped-def]
-    from muslin.inference.sequential.result import load_fit
-
-    return load_fit(study).noise
 
 
 def test_kept_models_are_used_and_none_refitted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

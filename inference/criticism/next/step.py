@@ -33,7 +33,7 @@ from .words import SURE, TELLS, explain
 
 #: Rollouts of a search where nothing else is said, and fewer than which find nothing.
 SIMULATIONS, LEAST_SIMULATIONS = 400, 30
-#: Below this probability a motion is not worth recording.
+#: Below this probability a motion is not worth recording, unless several takes of it are.
 HOPELESS = 0.005
 
 
@@ -102,7 +102,7 @@ def propose_next(
         spent += bench.count
     result = _result(study, opening, limits, found, goal, spent, time.monotonic() - began)
     paragraphs = explain(result, limits.text())
-    best = found.best if result["probability"] >= HOPELESS else None
+    best = found.best if result["probability"] >= HOPELESS or result["takes"] else None
     _save(study, result, paragraphs, best, [] if goal is None else [m.name for m in goal.models], times)
     return NextExperiment(result, tuple(paragraphs), None if best is None else best.motion)
 
