@@ -8,7 +8,7 @@ import typer
 from ..core.registry import REGISTRY
 from ..core.study import Study
 from .console import ProgressView, command, next_step, say
-from .output import check_apart, check_output, check_result, write_json
+from .output import check_apart, check_output, check_result, check_two, write_json
 from .steps import Force, StudyFile, Workers
 
 Box = tuple[float, float, float, float, float, float]
@@ -64,6 +64,8 @@ def next_experiment(
             check_output(output, force)
         if json_file is not None:
             check_result(json_file, ".json", loaded)
+            if output is not None:
+                check_two(output, json_file)
         found = REGISTRY.get("step", "next")(
             loaded,
             effects=effects or (),

@@ -48,6 +48,12 @@ def check_apart(path: Path, study: Study) -> None:
         raise InputError(f"{path} is a file that {study.path} needs; name another file to write")
 
 
+def check_two(first: Path, second: Path) -> None:
+    """Refuse one place for two files that a command writes."""
+    if first.resolve() == second.resolve():
+        raise InputError(f"{first} cannot be both of the files to write; name two")
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write ``value`` as JSON, which has no NaN and no infinity: they become null."""
     write_text(path, json.dumps(_plain(value), indent=2, ensure_ascii=False, allow_nan=False) + "\n")

@@ -75,6 +75,14 @@ def test_a_file_that_is_there_is_kept_and_nothing_is_written_where_nothing_is_pr
     assert out.read_text() == "mine" and "is not written" in capsys.readouterr().out
 
 
+def test_two_files_are_not_written_to_one_place(
+    asked: dict[str, Any], study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = study.with_name("next.json")
+    assert status("next", str(study), "--out", str(out), "--json", f"{study.parent}/../{study.parent.name}/next.json") == 2
+    assert not asked and not out.exists() and "name two" in capsys.readouterr().err
+
+
 def test_a_study_that_was_not_fitted_or_limits_that_cannot_be_are_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
