@@ -79,7 +79,8 @@ def test_two_files_are_not_written_to_one_place(
     asked: dict[str, Any], study: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = study.with_name("next.json")
-    assert status("next", str(study), "--out", str(out), "--json", f"{study.parent}/../{study.parent.name}/next.json") == 2
+    same = f"{study.parent}/../{study.parent.name}/next.json"
+    assert status("next", str(study), "--out", str(out), "--json", same) == 2
     assert not asked and not out.exists() and "name two" in capsys.readouterr().err
 
 

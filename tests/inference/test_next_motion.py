@@ -97,7 +97,7 @@ def test_a_ready_made_motion_within_the_limits_is_played_as_it_is() -> None:
 
 
 def test_a_controller_of_a_thousand_hertz_is_sent_as_large_a_motion_from_rest_to_rest() -> None:
-    """What is moving already as it begins, or still as it ends, is eased; else it would be made smaller with the step."""
+    """What is moving already as it begins, or still as it ends, is eased, or it would be made smaller with the step."""
     limits = replace(OPEN, workspace=(-0.2, 0.2, 0.0, 0.2, -0.2, 0.3))
     moving = replace(hanging(preset("fling").motion()), times=np.linspace(0.3, 0.9, 40))
     for shape in known_shapes({"cut": moving}, limits):
