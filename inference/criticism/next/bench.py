@@ -139,8 +139,9 @@ class Bench:
         if not jobs:
             return []
         names = [f"motion {k}" for k in range(len(proposals))]
+        still = replace(self.scenario, start_motion=None, earlier=None)  # a new recording starts at rest
         scenarios = {
-            n: replace(self.scenario, motion=p.motion, times=self.times) for n, p in zip(names, proposals, strict=True)
+            n: replace(still, motion=p.motion, times=self.times) for n, p in zip(names, proposals, strict=True)
         }
         problem = replace(problem or self.problem, scenarios=scenarios, fit_on=(names[0],), hold_out=(), recordings={})
         out: list[FloatArray | None] = []
