@@ -99,8 +99,9 @@ def diagnose(
 
 def add(
     effect: Annotated[
-        str, typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them. None with --law.")
-    ],
+        str | None,
+        typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them. None with --law."),
+    ] = None,
     study: Annotated[
         Path | None, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")
     ] = None,
@@ -116,6 +117,8 @@ def add(
     force: Force = False,
 ) -> None:
     """Write a study of the same model with one more effect, its coefficients inferred from the recordings."""
+    if effect is None:
+        raise InputError("name what to add and to which study: muslin add EFFECT STUDY.toml, or --law FILE STUDY.toml")
     if law is not None and study is not None:
         raise InputError(f"name either the effect {effect!r} or a law, not both: muslin add --law FILE STUDY.toml")
     if law is None and study is None:
@@ -126,6 +129,8 @@ def add(
     loaded = Study.load(source)
     check_apart(target, loaded)
     check_output(target, force)
+    if law is not None and target.resolve() == law.resolve():
+        raise InputError(f"{law} is the law itself; name another file to write")
     made = (
         loaded.add(effect, target, overwrite=force)
         if law is None

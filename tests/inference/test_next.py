@@ -266,6 +266,8 @@ def test_bad_questions_are_answered_in_one_line(tmp_path: Path) -> None:
         propose(study, effects=("linear-drag", "linear-drag"))
     with pytest.raises(InputError, match="at least 30"):
         propose(study, effects=("linear-drag", "twin-drag"), simulations=3)
+    with pytest.raises(InputError, match="explains anything"):
+        propose(study, effects=("linear-drag", "law"))
     with pytest.raises(InputError, match="cloth and solid"):
         propose(study, effects=("linear-drag", "air-drag"))
 

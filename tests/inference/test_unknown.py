@@ -269,7 +269,8 @@ def test_the_command_line_says_what_was_found_and_adds_a_law(tmp_path: Path) -> 
     assert "wrote" in muslin("add", "--law", path, study.path, "-o", tmp_path / "study2.toml")
     assert "law.linear_drag" in Study.load(tmp_path / "study2.toml").problem.space.names
     assert "not both" in muslin("add", "air-drag", study.path, "--law", path)
-    assert "alone" in muslin("add", "air-drag")
+    assert "alone" in muslin("add", "air-drag") and "--law FILE STUDY.toml" in muslin("add", "--law", path)
+    assert "the law itself" in muslin("add", "--law", path, study.path, "-o", path, "--force")
     assert "has a law already" in muslin("add", "--law", path, tmp_path / "study2.toml", "-o", tmp_path / "3.toml")
     assert not (tmp_path / "3.toml").exists()
 

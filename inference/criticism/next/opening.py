@@ -120,6 +120,8 @@ def _check(study: Study, asked: Sequence[str]) -> None:
         effect = REGISTRY.get("effect", name)
         if name in study.config.effects:
             raise InputError(f"{name!r} is in the model of {study.path} already, so it is not in question")
+        if not effect.candidate and len(effect.coefficients) > 1:
+            raise InputError(f"{name!r} has so many coefficients that it explains anything; name another effect")
         reason = why_powerless(effect, problem.simulator, problem.scenarios[problem.fit_on[0]])
         if reason is not None:
             raise InputError(reason)
