@@ -94,6 +94,16 @@ def test_a_term_that_its_range_holds_back_is_said_to_be() -> None:
     assert "ends at" not in told(free, 0.02)[0]
 
 
+def test_where_a_spring_pulls_to_is_said() -> None:
+    spring = Piece("spring to a place", ("spring", "acceleration_x", "acceleration_y", "acceleration_z"))
+    plane = Piece("spring to a plane along y", ("spring_y", "acceleration_y"))
+    text = told(refitted({"spring": 20.0, "acceleration_y": 6.0, "acceleration_z": -4.0}, spring), 0.02)[0]
+    assert "pulls to x 0.000, y 0.300, z -0.200 m from the centre of the start." in text
+    assert "pulls to y 0.300 m" in told(refitted({"spring_y": 20.0, "acceleration_y": 6.0}, plane), 0.02)[0]
+    for other in ({"spring": -20.0, "acceleration_y": 6.0}, {"spring": 20.0}, {"acceleration_y": 6.0}):
+        assert "pulls to" not in told(refitted(other, spring), 0.02)[0]
+
+
 def test_a_frequency_is_not_held_back_by_zero() -> None:
     assert refitted({"sine_x": 4.0, "frequency": 0.01}, WAVE).at_end == ()
 

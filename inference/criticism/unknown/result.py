@@ -123,6 +123,7 @@ def law_text(result: dict[str, Any]) -> tuple[str, ...]:
     lines += [
         f"  {n} = {t['mean']:.4g} ± {t['sd']:.2g} {t['unit']}: {t['description']}" for n, t in law["terms"].items()
     ]
+    lines += _place(law["terms"])
     lines.append(f"This explains {_shares(law)}.")
     if law["at_end"]:
         lines.append(
@@ -153,6 +154,17 @@ def law_text(result: dict[str, Any]) -> tuple[str, ...]:
 
 def _mean(force: dict[str, Any], key: str) -> float:
     return float(np.mean([row[key] for row in force["recordings"].values()]))
+
+
+def _place(terms: dict[str, Any]) -> list[str]:
+    """Where springs pull to: the acceleration beside them moves their centre."""
+    mean = {name: t["mean"] for name, t in terms.items()}
+    stiffness = {e: mean.get("spring", 0.0) + mean.get(f"spring_{e}", 0.0) for e in "xyz"}
+    away = {e: mean.get(f"acceleration_{e}", 0.0) / k for e, k in stiffness.items() if k > 0}
+    if not any(away.values()):
+        return []
+    told = ", ".join(f"{e} {a:.3f}" for e, a in away.items())
+    return [f"With the acceleration its spring pulls to {told} m from the centre of the start."]
 
 
 def _shares(law: dict[str, Any]) -> str:
