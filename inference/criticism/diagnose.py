@@ -40,8 +40,6 @@ def diagnose(study: Study) -> Diagnosis:
         work = Work(study, problem, pool, fit)
         found = find(work, names, _fitted(study))
         plain = found.first.plain
-        if found.verdict == "named" and work.seen_with != found.effects:
-            work.see_numerics(found.effects, found.after.fit.unit)
         joint = work.jointly(found.after, plain, replace(plain, unit=_fitted(study)))
         found = confirmed(replace(found, after=joint.nearest), joint)
         # before is the fit as the user has it; the diagnosis' own plain fit leaves to numerics what they may explain

@@ -7,7 +7,6 @@ import numpy as np
 from ...core.arrays import FloatArray
 from .candidate import Candidate
 from .pairs import Pair, partners, promising_pairs
-from .reconsidered import reconsidered
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
 from .verdict import MARGIN, SHARE_LEFT, Decision, Evidence, Objection, Verdict, short_of_a_name
@@ -66,7 +65,7 @@ class Findings:
 
 def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     """Find what is missing among candidates ``names``, the plain model's fit starting at ``start`` (unit cube)."""
-    first = reconsidered(work, settled(work, run_stage(work, (), names, start)))
+    first = settled(work, run_stage(work, (), names, start))
     verdict = first.decision.verdict
     if verdict in ("no-misfit", "cannot-tell"):
         return Findings(verdict, (), first, first, _nearest(first))

@@ -45,7 +45,6 @@ class Work:
     Attributes:
         discrepancy: how far the model's own numbers may be off, as last seen.
         rough: what it cannot repeat, as last seen.
-        seen_with: the effects that it had then.
         moved: how far its own numbers move the model as it is, see :class:`~.numerics.Numerics`.
         limit: of rollouts, see :attr:`simulations`.
         cut_short: whether something was left out for want of them.
@@ -60,7 +59,6 @@ class Work:
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})
-        self.seen_with: tuple[str, ...] = ()
         self.moved: dict[str, float] = {}
         self._elsewhere = 0  # rollouts of other engines and meshes
         self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
@@ -102,20 +100,8 @@ class Work:
         )
         check_repeatable(self.discrepancy, self.problem.fit_on)
         self._elsewhere += found.cost
-        self.seen_with = effects
         if not effects:
             self.moved = found.moved
-
-    def where_it_fits(self, candidate: Candidate, plain: Polished) -> Evidence:
-        """A candidate beside the model without it, by the numerics as they are where it fits.
-
-        What was last seen of them stays what it was.
-        """
-        kept = self.discrepancy, self.rough, self.seen_with
-        self.see_numerics(self._effects_of(candidate), candidate.fit.unit)
-        joint = self.jointly(candidate, plain)
-        self.discrepancy, self.rough, self.seen_with = kept
-        return joint
 
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """A least-squares fit of the model with ``effects``, of as many evaluations as the budget has left."""
