@@ -164,20 +164,20 @@ def everywhere(m: Moment, axis: FloatArray) -> FloatArray:
 TERMS: tuple[Term, ...] = (
     _term("dry_drag", "m/s2", 2.0, "against the motion, whatever its speed", lambda m: -dry(m.velocity)),
     _term("linear_drag", "1/s", 10.0, "times the velocity", lambda m: -m.velocity),
-    _term("quadratic_drag", "1/m", 40.0, "times speed and velocity", lambda m: -m.speed * m.velocity),
+    _term("quadratic_drag", "1/m", 15.0, "times speed and velocity", lambda m: -m.speed * m.velocity),
     _term("cubic_drag", "s/m2", 3.0, "times squared speed and velocity", lambda m: -(m.speed**2) * m.velocity),
     _term("linear_drag_across", "1/s", 10.0, "times the velocity across", lambda m: -m.setting.skin * m.across),
     _term(
-        "quadratic_drag_across", "1/m", 40.0, "times speed and velocity across",
+        "quadratic_drag_across", "1/m", 15.0, "times speed and velocity across",
         lambda m: -m.setting.skin * length(m.across) * m.across,
     ),
     _term("linear_drag_along", "1/s", 10.0, "times the velocity along", lambda m: -m.setting.skin * m.along),
     _term(
-        "quadratic_drag_along", "1/m", 40.0, "times speed and velocity along",
+        "quadratic_drag_along", "1/m", 15.0, "times speed and velocity along",
         lambda m: -m.setting.skin * length(m.along) * m.along,
     ),
     _term(
-        "plate_drag", "1/m", 40.0, "times the speed across and the velocity, as the air on a plate",
+        "plate_drag", "1/m", 15.0, "times the speed across and the velocity, as the air on a plate",
         lambda m: -m.setting.skin * length(m.across) * m.velocity,
     ),
     _term("internal_drag", "m2/s", 0.002, "that evens out the velocities of neighbours", lambda m: m.exchange),
