@@ -144,10 +144,12 @@ Objection = Literal["invisible", "chance", "zero", "little", "held-out"]
 
 def objection(e: Evidence, candidate: Candidate) -> Objection | None:
     """What speaks against a candidate by itself; None where nothing does."""
-    why: Objection | None = "chance" if e.z(candidate) < SIGNIFICANT else None if _moved(candidate) else "zero"
-    if why is None:
+    by_chance = e.z(candidate) < SIGNIFICANT
+    if not by_chance and _moved(candidate):
         return short_of_a_name(e, candidate)
-    return why if candidate.visible else "invisible"
+    if not candidate.visible:
+        return "invisible"
+    return "chance" if by_chance else "zero"
 
 
 def short_of_a_name(e: Evidence, candidate: Candidate) -> Objection | None:

@@ -36,6 +36,7 @@ from table import RESULTS, commit, machine, versions
 def parsed() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", choices=list(FIRST_SEEDS), default="development", help="which seeds")
+    parser.add_argument("--first-seed", type=int, help="of an earlier batch, to make it again (default: the part's)")
     parser.add_argument("--cases", type=int, default=100, help="how many (default: 100)")
     parser.add_argument("--minutes", type=float, default=60.0, help="start no case after (default: 60)")
     parser.add_argument("--settings", nargs="*", choices=list(SETTINGS), default=list(SETTINGS), help="these alone")
@@ -45,12 +46,14 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--at-once", type=int, default=2, help="cases that run beside one another (default: 2)")
     parser.add_argument("--workers", type=int, default=1, help="processes of each study (default: 1)")
     parser.add_argument("--output", type=Path, default=RESULTS / "effects.json")
-    return parser.parse_args()
+    told = parser.parse_args()
+    told.first_seed = FIRST_SEEDS[told.part] if told.first_seed is None else told.first_seed
+    return told
 
 
-def chosen(part: str, count: int, settings: list[str], kinds: list[str]) -> list[Case]:
-    """The first cases of a part that are of these settings and kinds."""
-    cases = (c for c in plan(part) if c.setting in settings and c.kind in kinds)
+def chosen(first_seed: int, count: int, settings: list[str], kinds: list[str]) -> list[Case]:
+    """The first cases from a seed on that are of these settings and kinds."""
+    cases = (c for c in plan(first_seed) if c.setting in settings and c.kind in kinds)
     return list(itertools.islice(cases, count))
 
 
@@ -58,7 +61,7 @@ def main() -> None:
     a = parsed()
     a.output.parent.mkdir(parents=True, exist_ok=True)
     found, deadline = {}, time.monotonic() + 60 * a.minutes
-    cases = chosen(a.part, a.cases, a.settings, a.kinds)
+    cases = chosen(a.first_seed, a.cases, a.settings, a.kinds)
     kept, cache = (a.output.with_suffix(f".{what}.partial") for what in ("cells", "draws"))
     run = Run(kept, cache, a.workers, tuple(a.baselines), a.draws)
     for number, record in run.finished(cases, a.at_once, deadline):

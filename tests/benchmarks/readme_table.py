@@ -4,7 +4,7 @@ import json
 from typing import Any
 
 from effects_bench.table import shown
-from table import RESULTS
+from table import RESULTS, row
 
 SIMULATORS = ("mujoco", "pybullet")
 
@@ -31,19 +31,15 @@ def wider() -> list[str]:
     asked = [f for f in content["figures"] if f["bar"] and f["count"]]
     rivals = list(dict.fromkeys(name for f in asked for name in f["rivals"] or ()))
     heads = ["on the test seeds", "value", "cases", "95 % interval", "bar", *(f"`{name}`" for name in rivals)]
-    lines = [_row(heads), "|---" * len(heads) + "|"]
+    lines = [row(heads), "|---" * len(heads) + "|"]
     for f in asked:
         is_share = f["low"] is not None
         interval = f"{100 * f['low']:.1f} to {100 * f['high']:.1f} %" if is_share else ""
         met = "met" if f["met"] else "**missed**"
         theirs = [shown((f["rivals"] or {}).get(name), is_share) for name in rivals]
         cells = [f["name"], shown(f["value"], is_share), str(f["count"]), interval, f"{f['bar']}, {met}", *theirs]
-        lines.append(_row(cells))
+        lines.append(row(cells))
     return lines
-
-
-def _row(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
 
 
 def materials() -> list[str]:

@@ -54,6 +54,11 @@ def commit() -> str:
     return asked.stdout.strip() or "unknown"
 
 
+def row(cells: Sequence[str]) -> str:
+    """A row of a table in Markdown."""
+    return f"| {' | '.join(cells)} |"
+
+
 def report(name: str, rows: Sequence[Row], seeds: Sequence[int], seconds: float) -> Path:
     """Print the table and write it; a missed goal stays in the table as missed."""
     width = max(len(r.figure) for r in rows)
