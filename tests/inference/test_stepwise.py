@@ -136,7 +136,7 @@ def test_what_is_missing_beside_either_is_told() -> None:
 def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tuple[Findings, Hints]:
     """What is found where camera, grasp and tilt leave so much alone, and grasp and tilt together a number; hints.
 
-    A third number is what these two leave on held-out motions [noise variances], of which the plain model leaves eleven.
+    A third number is what these two leave on held-out motions [noise variances]; the plain model leaves eleven.
     """
     alone, together = {n: COUNT * x for n, x in request.param[0].items()}, COUNT * request.param[1]
     seen: dict[str, FloatArray] = {}
