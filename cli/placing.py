@@ -16,7 +16,7 @@ from ..core.scenarios.measured import MEASURED_NEAR
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
 from ..core.study.objects import keep_points
-from .rope_start import may_start_measured, why_not_measured
+from .rope_start import may_start_measured, sags_aside, why_not_measured
 from .study_file import plan_table
 from .study_plan import Plan
 
@@ -118,6 +118,7 @@ def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
     plan = replace(plan, start="measured")
     remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
     fitted = [keep_points(measured[name], plan.points) for name in plan.fit_on]
+    remarks += sags_aside(fitted)
     rough = np.concatenate([fourth_differences(r.series.points) for r in fitted])
     noise = robust_sd(rough) if len(rough) else 0.0
     if 0.0 < noise < _FAR_BETTER * MEASURED_NEAR:

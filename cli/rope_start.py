@@ -10,6 +10,9 @@ from .study_plan import Plan
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
 #: and the way from one to the next as long at most, over the shortest tree through them.
 _FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
+#: A rope that sags by this share of its length sags down, in the mean over its takes, to so many degrees: in 56 takes
+#: each of three cables, one of which keeps a bend, single takes do to 17.
+_SAGS, _ASIDE = 0.05, 60.0
 
 
 def may_start_measured(plan: Plan) -> bool:
@@ -46,6 +49,24 @@ def why_not_measured(recording: Recording, kept: list[int] | None) -> str | None
     if near.all() and (steps > 0).all() and steps.sum() < _IN_ORDER * _shortest_tree(first):
         return None
     return "its markers do not lead from the first gripper to the second one by one; name those that do with --points"
+
+
+def sags_aside(recordings: list[Recording]) -> list[str]:
+    """A warning if ropes between two grippers sag, in the mean of all frames, along another axis than down."""
+    sags, lengths = [], []
+    for recording in recordings:
+        points = recording.series.points
+        straight = np.linspace(points[:, 0], points[:, -1], points.shape[1], axis=1)
+        sags.append(np.nanmean(points - straight, axis=(0, 1)))
+        lengths.append(float(np.linalg.norm(np.diff(points[0], axis=0), axis=1).sum()))
+    sag = np.mean(sags, axis=0)
+    depth = float(np.linalg.norm(sag))
+    if depth < _SAGS * np.mean(lengths) or -sag[2] > depth * np.cos(np.radians(_ASIDE)):
+        return []
+    axis = int(np.argmax(np.abs(sag)))
+    along = f"{'+' if sag[axis] > 0 else '-'}{'xyz'[axis]}"
+    fix = f"import again with --up {'xyz'[axis]}" if axis < 2 and sag[axis] < 0 else "turn points and poses"
+    return [f"warning: the rope sags by {depth:.2g} m along {along}, and z is taken to be up; {fix} if it is not"]
 
 
 def _shortest_tree(points: FloatArray) -> float:

@@ -18,6 +18,7 @@ from .csv_points import read_csv
 from .gripper import read_gripper_csv, to_motion
 from .npz import read_npz
 from .options import ImportOptions
+from .quaternion_order import doubt_order
 from .raw import RawTake
 from .units import to_si, unit_named
 from .zeros import unseen_zeros
@@ -44,6 +45,7 @@ def import_together(files: Iterable[tuple[Path, ImportOptions]]) -> list[Recordi
         InputError: a file cannot be right; says where and what would be.
     """
     takes = [(take, path, options) for path, options in files for take in _read(path, options)]
+    _doubt_names([(take, path) for take, path, _ in takes])
     orders: dict[frozenset[str], tuple[tuple[str, ...], Path]] = {}
     for take, path, _ in takes:
         orders.setdefault(frozenset(take.labels), (take.labels, path))
@@ -51,6 +53,19 @@ def import_together(files: Iterable[tuple[Path, ImportOptions]]) -> list[Recordi
         _recording(_in_order(take, path, *orders[frozenset(take.labels)]), path, options)
         for take, path, options in takes
     ]
+
+
+def _doubt_names(takes: list[tuple[RawTake, Path]]) -> None:
+    """Say where points have other names than in the first file of as many: only their order says which is which."""
+    first: dict[int, tuple[set[str], Path]] = {}
+    for take, path in takes:
+        names, other = first.setdefault(len(take.labels), (set(take.labels), path))
+        if strange := sorted(set(take.labels) - names):
+            missing = sorted(names - set(take.labels))
+            note(
+                f"{path}: its points {', '.join(strange)} are not in {other}, which has {', '.join(missing)}; they are "
+                "taken for the same by the order in the file, so check that it is the same"
+            )
 
 
 def _in_order(take: RawTake, path: Path, order: tuple[str, ...], first: Path) -> RawTake:
@@ -95,6 +110,8 @@ def _recording(take: RawTake, path: Path, options: ImportOptions) -> Recording:
     take = _without_zeros(take, correspondence, where)
     take = _cropped(take, options, where)
     points, si = to_si(take.points, unit, where)
+    if take.gripper is not None and options.gripper is None and si == "m" and correspondence:
+        doubt_order(take.time, points, to_motion(take.gripper, unit, "z", str(path)), where)
     points = turned(points, options.up, where)
     lens = None if options.camera is None else Lens.load(options.camera)
     if lens is not None and si == "px" and points.shape[2] == 2:

@@ -74,6 +74,26 @@ def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
     assert config.simulator.options["time_step"] == REGISTRY.get("simulator", "mujoco").usual_steps["rope"]
 
 
+@pytest.mark.parametrize(
+    ("axes", "signs", "said"),
+    [
+        ([0, 1, 2], 1.0, None),
+        ([1, 2, 0], 1.0, "along -y, and z is taken to be up; import again with --up y if it is not"),
+        ([0, 1, 2], -1.0, "along +z, and z is taken to be up; turn points and poses if it is not"),
+    ],
+)
+def test_a_rope_that_does_not_sag_down_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], axes: list[int], signs: float, said: str | None
+) -> None:
+    points, motion = from_end_to_end(9)
+    poses = motion.poses.copy()
+    poses[..., :3] = signs * poses[..., axes]
+    measurement = save(tmp_path, signs * points[:, axes], Motion(motion.times, poses))
+    assert status("new", tmp_path / "s.toml", "--measurement", measurement, "--scenario", "cable") == 0
+    printed = capsys.readouterr().out
+    assert ("the rope sags by 0." in printed) == (said is not None) and (said or "") in printed
+
+
 def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rope of one length that bends more and more, with markers above it."""
     away, length = 0.012 * np.sin(np.linspace(0, np.pi, 9)), 0.6

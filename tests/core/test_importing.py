@@ -1,3 +1,4 @@
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 from muslin.core.dataset import DatasetNote
 from muslin.core.errors import InputError, MissingFileError, MuslinError
 from muslin.core.importing import ImportOptions, import_file
+from muslin.core.motion import rotate
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -122,6 +124,22 @@ def test_grippers_that_cannot_be(tmp_path: Path) -> None:
     assert "no gripper_pose" in complaint(npz(tmp_path, gripper_time=TIME))
     falling = complaint(npz(tmp_path, gripper_pose=still, gripper_time=TIME[::-1]))
     assert "gripper time must rise" in falling
+
+
+@pytest.mark.parametrize("order, doubted", [([0, 1, 2, 3], False), ([1, 2, 3, 0], True)])
+def test_quaternions_in_another_order_are_doubted(tmp_path: Path, order: list[int], doubted: bool) -> None:
+    """A marker at the gripper goes along with it, if its turns are read as they were meant."""
+    half = np.linspace(0.1, 0.6, 11)
+    turns = np.stack([np.cos(half), 0.6 * np.sin(half), np.zeros(11), 0.8 * np.sin(half)], axis=1)
+    places = np.stack([TIME, np.zeros(11), 1.0 - TIME], axis=1)
+    held = places + rotate(turns, np.array([0.02, 0.05, -0.03]))
+    pose = np.concatenate([places, turns[:, order]], axis=1)[:, None]
+    file = npz(tmp_path, points=np.stack([places - [0.0, 0.0, 0.4], held], axis=1), gripper_pose=pose)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        import_file(file)
+    expected = ["are read as w x y z, but look like x y z w: read so, point 1, the nearest to it"] if doubted else []
+    assert [e in str(w.message) for e, w in zip(expected, told, strict=True)] == [True] * len(expected)
 
 
 def test_csv_with_gaps_and_several_takes(tmp_path: Path) -> None:

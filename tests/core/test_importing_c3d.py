@@ -65,6 +65,14 @@ def test_markers_are_the_same_in_all_files_by_their_names(tmp_path: Path) -> Non
     np.testing.assert_array_equal(c.series.points, d.series.points)  # nothing tells the two apart
 
 
+def test_markers_of_other_names_are_told(tmp_path: Path) -> None:
+    first = write_c3d(tmp_path / "a.c3d", sample(), labels=["tip", "middle", "clamp"])
+    other = write_c3d(tmp_path / "b.c3d", sample(), labels=["tip", "elbow", "clamp"])
+    told = r"b\.c3d: its points elbow are not in .*a\.c3d, which has middle; they are taken for the same by the order"
+    with pytest.warns(UserWarning, match=told):
+        import_together([(path, ImportOptions()) for path in (first, other)])
+
+
 def test_a_file_cut_short(tmp_path: Path) -> None:
     whole = write_c3d(tmp_path / "a.c3d", sample()).read_bytes()
     (tmp_path / "b.c3d").write_bytes(whole[: len(whole) - 48 * 8])
