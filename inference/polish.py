@@ -33,10 +33,12 @@ class Polished(Found):
     Args:
         covariance: of ``unit``, from the curvature at the best fit (Laplace), ``(D, D)``.
         count: independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left.
+        rested: the search ended by itself, so that more evaluations from here gain next to nothing.
     """
 
     covariance: FloatArray
     count: float
+    rested: bool = False
 
     @property
     def widened(self) -> FloatArray:
@@ -157,7 +159,8 @@ def polish(
     enough, coarse = TOLD_APART / count, max(least, COARSE)
     at = Found(start, white, np.zeros((len(white), len(start))) if known is None else known)
     best, used, smooth = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
-    while True:
+    rested = False
+    while not rested:
         before = best.rss
         if used < evaluations and not (roughly or smooth):
             best, more, _ = search(
@@ -170,12 +173,11 @@ def polish(
         at, left = replace(best, jacobian=jacobian), evaluations - used
         best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
         used += more + len(start)
-        if before - best.rss < CHANCE * enough * best.rss:  # so near that the derivatives hold
-            break
+        rested = before - best.rss < CHANCE * enough * best.rss  # so near that the derivatives hold
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
     information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
     covariance = np.asarray(np.linalg.inv(information), float)
-    return Polished(best.unit, best.white, jacobian, covariance, count)
+    return Polished(best.unit, best.white, jacobian, covariance, count, rested)
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:

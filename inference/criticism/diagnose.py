@@ -14,7 +14,7 @@ from .before_after import BeforeAfter
 from .candidate import Candidate
 from .candidate_names import candidate_names
 from .sentences import explain, told
-from .stepwise import Findings, confirmed, find
+from .stepwise import Findings, borne_out, confirmed, find
 from .told import Told
 from .verdict import Evidence
 from .where import where_it_is
@@ -47,6 +47,7 @@ def diagnose(study: Study) -> Diagnosis:
         changed = found.verdict in ("named", "tied")
         later = work.as_a_user_fits(found.after) if changed else found.after.fit.unit
         pair = BeforeAfter(work, started, (found.after.space, later))
+        found = borne_out(found, joint, *pair.error(problem.hold_out))
         surely = _surely(work, found)
         count = work.simulations
     result = _result(study, found, surely, joint, pair, work, count, time.monotonic() - began)

@@ -6,13 +6,13 @@ import numpy as np
 from scipy import stats
 
 from .candidate import Candidate, best_starts
-from .stage import MORE_EVALUATIONS, NEARLY, Stage
+from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, from_there_too
 from .verdict import MARGIN, Evidence, decide, objection
 from .work import Work
 
 #: Points of the parameters' prior that are looked at (a power of two), how many of the best are fitted from, and
 #: evaluations of each before it is given up.
-PLACES, RESTARTS, FEW_EVALUATIONS = 16, 2, 12
+PLACES, RESTARTS = 16, 2
 #: A leader that explains less than this share of the excess misfit is not fitted further: that would not make it the
 #: answer.
 HOPEFUL = 0.5
@@ -37,9 +37,8 @@ def settled(work: Work, stage: Stage) -> Stage:
             if evidence.explained(c) >= NEARLY * reached:
                 evidence = _with(evidence, _fitted_on(work, stage, c))
     best, plain = evidence.nearest, stage.plain
-    if best.rss < stage.evidence.nearest.rss:  # a better start must not pass for an effect
-        again = work.polished(stage.effects, best.fit.unit[: best.base], MORE_EVALUATIONS)
-        plain = min(plain, again, key=lambda p: p.rss)
+    if best.rss < stage.evidence.nearest.rss:
+        plain = from_there_too(work, stage.effects, plain, best)
     # what held-out motions say of a candidate, they say of it as it is now, beside the model without it
     evidence = work.evidence(stage.effects, plain, evidence.candidates)
     return replace(stage, plain=plain, evidence=evidence, decision=decide(evidence))
@@ -48,7 +47,7 @@ def settled(work: Work, stage: Stage) -> Stage:
 def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
     """Polished further, and where that leaves a misfit, from other parameters too."""
     effects = (*stage.effects, c.name)
-    if (stage.evidence.left(c) > 0.0 or not c.refitted) and work.may_go_on():
+    if (stage.evidence.left(c) > 0.0 or not c.refitted) and not c.fit.rested and work.may_go_on():
         fit = work.polished(effects, c.fit.unit, MORE_EVALUATIONS)
         c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True)
     if stage.evidence.left(c) > 0.0 and work.may_go_on():
@@ -56,7 +55,7 @@ def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
         points = np.repeat(c.fit.unit[None], PLACES, axis=0)
         points[:, : c.base] = stats.qmc.Sobol(c.base, rng=rng).random(PLACES)
         for unit, _ in best_starts(work.objective(effects), points)[:RESTARTS]:
-            there = work.roughly_polished(effects, unit, FEW_EVALUATIONS, None)
+            there = work.roughly_polished(effects, unit, START_EVALUATIONS, None)
             if c.rss - there.rss > MARGIN:  # more than the same place again
                 c = replace(c, fit=work.polished(effects, there.unit, MORE_EVALUATIONS))
     return c

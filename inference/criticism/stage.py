@@ -10,23 +10,25 @@ from ...core.arrays import FloatArray
 from ..polish import Polished
 from .candidate import Candidate, best_starts, drop_z, screening_points
 from .linear import Look, least_square, look_at
-from .verdict import SIGNIFICANT, Decision, Evidence, Objection, decide, has_misfit, objection
+from .verdict import MARGIN, SIGNIFICANT, Decision, Evidence, Objection, decide, has_misfit, objection
 from .work import Work
 
 #: Least-squares evaluations for a candidate that passed the screening, for a contender on top, for the plain model at
-#: first, and to the end.
-FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, PLAIN_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 12, 40
-#: Points of every candidate in the first screening, beside where a linear model would go.
-FEW_POINTS = 3
-#: A response to the first look so much larger than the misfit is looked at on other scales.
-FAR_OFF = 3.0
+#: first, from another start before it is given up, and to the end.
+FIRST_EVALUATIONS, CONTENDER_EVALUATIONS, PLAIN_EVALUATIONS, START_EVALUATIONS, MORE_EVALUATIONS = 3, 4, 12, 12, 40
+#: How far the first screening goes along where a linear model would, beside where that ends [of the prior range of the
+#: coefficient that goes farthest]: across kinks, which hide from it what a small step away is worth.
+LADDER = (0.2, 0.4, 0.8)
+#: A response to the first look so much larger than the misfit is looked at on other scales, so many.
+FAR_OFF, SCALES = 3.0, 3
 #: How many candidates pass the screening, and the first polish: by what they reach, and as many by what they promise.
 SCREENED, CONTENDERS = 5, 3
 #: Share of what is left of the budget that goes to finding out who leads; the rest is for polishing these, without
 #: which nothing is named.
 LEADERS_SHARE = 0.7
-#: The candidates that are polished to the end: this many, and all that explain this share of what the best does.
-FINALISTS, NEARLY = 2, 0.75
+#: The candidates that are polished to the end: the best; of so many, those that explain this share of what it does; and
+#: all that explain this much of it.
+FINALISTS, FAR_BEHIND, NEARLY = 2, 0.3, 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +86,20 @@ def run_stage(
         candidates = tournament.run()
         best = min(candidates, key=lambda c: c.rss)
         if best.rss < plain.rss:
-            # the plain model gets the best candidate's start too, or a better start would pass for an effect
-            again = work.polished(effects, best.fit.unit[: len(plain.unit)], MORE_EVALUATIONS)
-            plain = min(plain, again, key=lambda p: p.rss)
+            plain = from_there_too(work, effects, plain, best)
         evidence = work.evidence(effects, plain, candidates)
     return Stage(effects, plain, looks, evidence, decide(evidence))
+
+
+def from_there_too(work: Work, effects: tuple[str, ...], plain: Polished, best: Candidate) -> Polished:
+    """The plain fit or one from the best candidate's parameters: no better start passes for an effect.
+
+    A first approach that comes to the same place again, or of which even a linear model promises no better, is left.
+    """
+    there = work.roughly_polished(effects, best.fit.unit[: len(plain.unit)], START_EVALUATIONS, None)
+    if plain.rss - least_square(there.unit, there.white, there.jacobian)[1] > MARGIN:
+        there = work.polished(effects, there.unit, MORE_EVALUATIONS)
+    return min(plain, there, key=lambda p: p.rss)
 
 
 def _seen_only(look: Look, plain: Polished) -> Candidate:
@@ -133,12 +144,12 @@ class _Tournament:
             self.work.study.progress(f"screening {name}", k + 1, len(acting))
             look = self.looks[name]
             there = self.moved(found[name], look.at[None])
-            off = look.reach >= FAR_OFF  # then points all over the prior are wrong by as much
-            found[name] = self.rescaled(there, look) if off else self.screened(there, FEW_POINTS)
+            off = look.reach >= FAR_OFF  # then points farther away are wrong by as much
+            found[name] = self.rescaled(there, look) if off else self.climbed(there, look)
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             self.work.study.progress(f"trying {name}", 0, 0)
-            found[name] = self.approached(self.screened(found[name], self.points - FEW_POINTS), FIRST_EVALUATIONS)
+            found[name] = self.approached(self.screened(found[name], self.points - len(LADDER)), FIRST_EVALUATIONS)
         tried = {n: found[n] for n in acting}
         goals = {n: least_square(c.fit.unit, c.fit.white, c.fit.jacobian) for n, c in tried.items()}
         for name in _leaders({n: c.rss for n, c in tried.items()}, {n: g[1] for n, g in goals.items()}, CONTENDERS):
@@ -147,9 +158,10 @@ class _Tournament:
             there = self.moved(found[name], goals[name][0][None])
             found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         order = sorted(found.values(), key=lambda c: c.rank)
-        near = self.plain.rss - NEARLY * (self.plain.rss - order[0].rss)
+        most = self.plain.rss - order[0].rss
         for k, c in enumerate(order):
-            if (k < FINALISTS or c.rss < near) and self.work.may_go_on():
+            near = self.plain.rss - c.rss > (FAR_BEHIND if k < FINALISTS else NEARLY) * most
+            if (k == 0 or near) and self.work.may_go_on():
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)
@@ -164,7 +176,7 @@ class _Tournament:
         objective = self.work.objective((*self.effects, candidate.name))
         smallest, largest = look.step / look.reach, look.step
         size = float(np.sqrt(smallest * largest))
-        for _ in range(FEW_POINTS):
+        for _ in range(SCALES):
             if not self.work.may_go_on(self.until):
                 break
             point = look.along(size)
@@ -178,6 +190,10 @@ class _Tournament:
                 smallest = size
             size = float(np.sqrt(smallest * largest))
         return candidate
+
+    def climbed(self, candidate: Candidate, look: Look) -> Candidate:
+        """The best of the candidate and of points that go farther and farther along the linear model's way."""
+        return self.moved(candidate, np.stack([look.along(size) for size in LADDER]), made_up_for=True)
 
     def screened(self, candidate: Candidate, count: int) -> Candidate:
         """The best of the candidate and of ``count`` points that fill its prior."""
@@ -238,6 +254,7 @@ class _Tournament:
 
 
 def _leaders(reached: dict[str, float], promised: dict[str, float], count: int) -> list[str]:
-    """The names with the smallest numbers of either kind."""
-    leaders = {*sorted(reached, key=reached.__getitem__)[:count], *sorted(promised, key=promised.__getitem__)[:count]}
-    return [name for name in reached if name in leaders]
+    """The names with the smallest numbers of either kind; what is reached comes first, as the budget may end."""
+    order = sorted(reached, key=reached.__getitem__)
+    leaders = {*order[:count], *sorted(promised, key=promised.__getitem__)[:count]}
+    return [name for name in order if name in leaders]

@@ -9,7 +9,17 @@ from .candidate import Candidate
 from .pairs import Pair, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
-from .verdict import MARGIN, SHARE_LEFT, Decision, Evidence, Objection, Verdict, short_of_a_name
+from .verdict import (
+    HELD_OUT_SLACK,
+    MARGIN,
+    SHARE_LEFT,
+    Decision,
+    Evidence,
+    Objection,
+    Verdict,
+    nothing_named,
+    short_of_a_name,
+)
 from .work import Work
 
 #: Effects that one diagnosis may name.
@@ -20,11 +30,11 @@ PARTNERS = 8
 
 @dataclass(frozen=True)
 class Doubt:
-    """Why an effect that seemed to be the answer is not, by the numerics as they are where it fits.
+    """Why an effect that seemed to be the answer is not, seen where it fits.
 
     Args:
         effect: its name.
-        explained: share of the excess misfit, there.
+        explained: share of the excess misfit, by the numerics as they are there.
         objection: what it lacks.
     """
 
@@ -90,8 +100,29 @@ def confirmed(found: Findings, joint: Evidence) -> Findings:
         return found
     if (why := short_of_a_name(joint, joint.nearest)) is None:
         return found
+    return _doubted(found, joint, why)
+
+
+def borne_out(found: Findings, joint: Evidence, before: float, after: float) -> Findings:
+    """No name for one effect with which a user's model is further off on held-out motions, if these would show it.
+
+    Beside what numerics may be off by, one that only moves what a cloth does by chance may seem to lessen the error.
+
+    Args:
+        found: by the evidence.
+        joint: the model as it was beside all that was found.
+        before, after: root mean square errors on held-out recordings, fitted as a user does [unit].
+    """
+    if found.verdict != "named" or len(found.effects) > 1 or not joint.nearest.shown_held_out:
+        return found
+    worse = after**2 > (1.0 + HELD_OUT_SLACK) * before**2
+    return _doubted(found, joint, "held-out") if worse else found
+
+
+def _doubted(found: Findings, joint: Evidence, why: Objection) -> Findings:
     doubt = Doubt(found.after.name, joint.explained(joint.nearest), why)
-    return Findings("none", (), found.first, found.first, found.after, doubt=doubt)
+    verdict = nothing_named(found.first.evidence)
+    return Findings(verdict, (), found.first, found.first, found.after, doubt=doubt)
 
 
 def _forward(work: Work, names: list[str], found: Findings, pairs: list[Pair]) -> Findings:

@@ -159,12 +159,19 @@ def short_of_a_name(e: Evidence, candidate: Candidate) -> Objection | None:
     return None if e.better_held_out(candidate) else "held-out"
 
 
+def nothing_named(e: Evidence) -> Verdict:
+    """What is said where no candidate is the answer."""
+    if has_misfit(e):
+        return "none"
+    seen = sum(c.visible for c in e.candidates)
+    return "no-misfit" if seen >= MOST_VISIBLE * len(e.candidates) else "cannot-tell"
+
+
 def decide(e: Evidence) -> Decision:
     """The five verdicts, in the order in which they are ruled out."""
     passing = sorted((c for c in e.candidates if objection(e, c) is None), key=lambda c: c.rank)
     if not has_misfit(e) and not any(_clear_gain(e, c) for c in passing):
-        seen = sum(c.visible for c in e.candidates)
-        return Decision("no-misfit" if seen >= MOST_VISIBLE * len(e.candidates) else "cannot-tell", ())
+        return Decision(nothing_named(e), ())
     if not any(c.refitted for c in (passing[:1] or e.candidates)):  # nothing is named nor ruled out unfitted
         return Decision("cannot-tell", (), unfinished=True)
     if not passing:

@@ -32,6 +32,12 @@ def test_the_minimum_and_its_covariance() -> None:
     np.testing.assert_allclose(best.covariance, np.linalg.inv(matrix.T @ matrix + 12 * np.eye(2)), rtol=1e-6)
 
 
+def test_whether_more_evaluations_would_gain_anything_is_told() -> None:
+    assert polish(Linear(2.0), np.array([0.1, 0.1])).rested
+    assert not polish(Bent(2.0), np.array([0.1, 0.9]), 5).rested
+    assert not polish(Linear(2.0), np.array([0.1, 0.1]), roughly=True).rested
+
+
 class TwoValleys(Linear):
     """A linear problem that looks like another, which nothing fits, where the first parameter is above a half.
 

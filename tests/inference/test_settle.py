@@ -61,6 +61,15 @@ def test_the_right_effect_overtakes_a_look_alike() -> None:
     assert after.evidence.left(after.chosen) == 0.0
 
 
+def test_a_search_that_ended_by_itself_is_not_gone_on_with() -> None:
+    """More evaluations from there gain nothing; other parameters are tried at once."""
+    drag = candidate("drag", 2.0 * COUNT)
+    for rested in (True, False):
+        bench = Bench({"drag": 2.0 * COUNT, "plain": 9 * COUNT})
+        settled(bench, stage(replace(drag, fit=replace(drag.fit, rested=rested))))  # type: ignore[arg-type]
+        assert bench.asked.count("drag") == (2 if rested else 3)  # two are from other parameters
+
+
 def test_rivals_are_left_alone_where_the_leader_leaves_noise() -> None:
     bench = Bench({"drag": COUNT, "plain": 9 * COUNT})
     after = settled(bench, stage(candidate("drag", 1.5 * COUNT), candidate("lag", 1.6 * COUNT)))  # type: ignore[arg-type]

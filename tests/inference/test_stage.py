@@ -1,6 +1,7 @@
 """How a diagnosis spends its simulations, and what it says of a misfit that stays."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from muslin.core.arrays import FloatArray
 from muslin.inference.criticism import work
 from muslin.inference.criticism.diagnose import _rest
 from muslin.inference.criticism.linear import Look
-from muslin.inference.criticism.stage import Stage, _Tournament
+from muslin.inference.criticism.stage import Stage, _leaders, _Tournament, from_there_too
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.criticism.work import Work, usual_simulations
 from muslin.inference.polish import Polished
@@ -135,6 +136,71 @@ def test_a_search_goes_on_from_where_the_parameters_make_up_for_an_effect() -> N
     )
     tournament.run()
     assert starts[0][0] < 0.01 < starts[0][1]
+
+
+def test_the_first_screening_looks_across_a_kink() -> None:
+    """A little of the effect makes the cloth fold the other way, which is worse; more of it is right."""
+    starts: list[FloatArray] = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
+        starts.append(unit)
+        return candidate("drag", COUNT).fit
+
+    work, tournament = bench(polished)
+    work.objective = lambda effects: SimpleNamespace(
+        many=lambda points: [np.full(int(COUNT), 1.1 if 0.35 < p[1] < 0.45 and p[0] == 0.5 else 3.0) for p in points]
+    )
+    tournament.run()
+    assert starts[0] == pytest.approx(np.array([0.5, 0.4]))
+
+
+def test_what_has_come_nearest_is_tried_first() -> None:
+    reached, promised = {"hem": 3.0, "drag": 1.0, "lag": 2.0, "wind": 4.0}, {"hem": 2.0, "wind": 0.0, "drag": 1.0}
+    assert _leaders(reached, promised, 1) == ["drag", "wind"]
+    assert _leaders(reached, promised, 2) == ["drag", "lag", "wind"]
+
+
+@pytest.mark.parametrize(
+    ("best", "behind", "refitted"), [(1.0, 1.8, ["drag"]), (1.0, 1.6, ["drag", "wind"]), (2.0, 2.0, ["drag"])]
+)
+def test_what_is_far_behind_is_not_refitted(best: float, behind: float, refitted: list[str]) -> None:
+    """The plain model leaves twice the noise, drag one noise less; the other a fifth of that less, or two fifths."""
+    asked = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
+        asked.extend(effects)
+        return candidate(effects[0], COUNT).fit
+
+    left = {"drag": best * COUNT, "wind": behind * COUNT}
+    work, one = bench(polished)
+    work.roughly_polished = lambda effects, *_: candidate(effects[0], left[effects[0]]).fit
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
+    looks = {n: replace(one.looks["drag"], name=n, space=candidate(n, COUNT).space) for n in left}
+    found = _Tournament(work, (), one.plain, looks, {}).run()  # type: ignore[arg-type]
+    assert asked == refitted and [c.name for c in found if c.refitted] == refitted
+
+
+@pytest.mark.parametrize(
+    ("reached", "promised", "asked"), [(2.0, 2.0, 12), (2.1, 2.05, 12), (2.1, 1.5, 40), (1.5, 1.5, 40)]
+)
+def test_the_model_as_it_is_gets_another_start_as_far_as_that_promises(
+    reached: float, promised: float, asked: int
+) -> None:
+    plain, evaluations = candidate("x", 2.0 * COUNT).fit, []
+    there = candidate("x", reached * COUNT).fit
+    # what a linear model promises: so much along one direction goes away
+    jacobian = np.zeros((len(there.white), 2))
+    jacobian[: round(len(there.white) * (1.0 - promised / reached)), 0] = 1e3
+    there = replace(there, jacobian=jacobian)
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, limit: int, *_: object) -> Polished:
+        evaluations.append(limit)
+        return there
+
+    work = SimpleNamespace(polished=polished, roughly_polished=polished)
+    found = from_there_too(work, (), plain, candidate("drag", COUNT))  # type: ignore[arg-type]
+    assert evaluations[-1] == asked
+    assert found.rss == pytest.approx(min(reached, 2.0) * COUNT)
 
 
 @pytest.mark.parametrize(

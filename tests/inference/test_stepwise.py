@@ -16,7 +16,7 @@ from muslin.inference.criticism.caveats import further
 from muslin.inference.criticism.linear import Look
 from muslin.inference.criticism.pairs import Pair
 from muslin.inference.criticism.stage import Stage
-from muslin.inference.criticism.stepwise import Doubt, Findings, confirmed, find
+from muslin.inference.criticism.stepwise import Doubt, Findings, borne_out, confirmed, find
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.polish import Polished
 
@@ -225,6 +225,28 @@ def test_a_name_stands_only_if_nothing_speaks_against_it_where_it_fits(
         assert (told.verdict, told.effects, told.after.name) == ("none", (), "tilt")
         for other in (replace(found, verdict="tied"), replace(found, effects=("tilt", "wind"))):
             assert confirmed(other, joint) is other
+
+
+@pytest.mark.parametrize("shift, after, named", [(100.0, 1.005, True), (100.0, 1.02, False), (4.0, 1.02, True)])
+def test_a_name_does_not_make_a_users_held_out_error_larger(shift: float, after: float, named: bool) -> None:
+    """Unless these motions are too gentle to show the effect."""
+    first = first_stage({"tilt": 1.2 * COUNT, "wind": 6 * COUNT})
+    found = Findings("named", ("tilt",), first, first, first.chosen)
+    joint = evidence(9 * COUNT, replace(candidate("tilt", 1.2 * COUNT), held_out_shift=shift))
+    told = borne_out(found, joint, 0.003, 0.003 * after)
+    if named:
+        assert told is found
+    else:
+        assert (told.verdict, told.effects) == ("none", ())
+        assert told.doubt == Doubt("tilt", pytest.approx(1.0, abs=0.05), "held-out")  # type: ignore[arg-type]
+    assert borne_out(replace(found, verdict="tied"), joint, 0.003, 0.004).verdict == "tied"
+
+
+def test_a_doubted_name_for_what_may_be_noise_leaves_no_misfit() -> None:
+    first = first_stage({"tilt": 0.9 * COUNT, "wind": 0.99 * COUNT})
+    first = replace(first, evidence=replace(first.evidence, rss_plain=COUNT))
+    found = Findings("named", ("tilt",), first, first, first.candidate("tilt"))
+    assert borne_out(found, first.evidence, 0.003, 0.004).verdict == "no-misfit"
 
 
 @pytest.mark.parametrize("names, rest", [(["drag"], Decision("none", ())), (["drag", "lag"], None)])
