@@ -113,6 +113,11 @@ def test_bars_intervals_and_rivals_are_in_the_table() -> None:
     assert (top.value, top.count, top.met, top.rivals) == (0.9, 10, False, {"bic": 0.0})
     assert found["coefficients: 90 % intervals that hold the truth"].value == 1.0  # 1.1 +- 0.16 about 1.0
     assert found["coefficients: relative error, median"].value == pytest.approx(0.1)
+    assert found["other engine: 90 % intervals that hold the truth"].count == 0
+    for one in records:
+        one["case"] = one["case"] | {"source": "other"}
+    other = {f.name: f for f in figures(records, [])}["other engine: 90 % intervals that hold the truth"]
+    assert (other.value, other.count) == (1.0, 9)
     over = found["held-out error over noise, median"]
     assert over.value == pytest.approx(1.0) and over.met
     assert found["top-1, cloth with contact"] == Figure(

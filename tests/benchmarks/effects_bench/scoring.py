@@ -149,6 +149,8 @@ def every(*tests: Test) -> Test:
 OWN_ENGINE = source("same", "finer")
 #: One effect of the library, motions that show it, and the model's own engine, be its mesh finer or not.
 RICH = every(kind("known"), OWN_ENGINE)
+#: The same in the other engine's data.
+ELSEWHERE = every(kind("known"), source("other"))
 
 
 @dataclass(frozen=True)
@@ -184,18 +186,18 @@ SHARES = (
     Share("'tied' where two look alike", kind("tied"), tied_right, (">=", 0.80)),
     Share("'cannot-tell' where the data are poor", kind("poor"), cannot_tell, (">=", 0.80)),
     Share("no name where the data are poor", kind("poor"), no_name),
-    Share("other engine: top-1", every(kind("known"), source("other")), top, (">=", 0.80)),
+    Share("other engine: top-1", ELSEWHERE, top, (">=", 0.80)),
     Share("other engine: a name where nothing is hidden", every(kind("none"), source("other")), names, ("<=", 0.05)),
     Share("both of two effects named", kind("two"), both),
     Share("right kind of effect, under another law", kind("law"), in_set),
 )
 
 
-def intervals(cases: Sequence[Judged]) -> tuple[list[float], list[bool]]:
+def intervals(cases: Sequence[Judged], where: Test = RICH) -> tuple[list[float], list[bool]]:
     """Of the coefficients of rightly named effects: relative errors, and whether 90 % intervals hold the truth."""
     errors, held = [], []
     for j in cases:
-        if not (RICH(j) and j.answer.effects and top(j)):
+        if not (where(j) and j.answer.effects and top(j)):
             continue
         row = next(c for c in j.record["diagnosis"]["candidates"] if c["name"] == j.answer.effects[0])
         for name, true in j.truth["coefficients"][row["name"]].items():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .scoring import SHARES, Judged, held_out_left, held_out_over_noise, intervals, judged, wilson
+from .scoring import ELSEWHERE, SHARES, Judged, held_out_left, held_out_over_noise, intervals, judged, wilson
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def _ratio(pair: tuple[int, int]) -> float | None:
 
 def _numbers(own: Sequence[Judged], records: Sequence[dict[str, Any]], rivals: Sequence[str]) -> list[Figure]:
     sizes = [float(len(j.answer.effects)) for j in own if j.case["kind"] == "known" and j.answer.effects]
-    errors, held = intervals(own)
+    (errors, held), (_, there) = intervals(own), intervals(own, ELSEWHERE)
     cover = sum(held) / len(held) if held else None
     low, high = wilson(sum(held), len(held))
     over, left = held_out_over_noise(own), held_out_left(own)
@@ -78,6 +78,12 @@ def _numbers(own: Sequence[Judged], records: Sequence[dict[str, Any]], rivals: S
             high,
             "85 to 95 %",
             None if cover is None else 0.85 <= cover <= 0.95,
+        ),
+        Figure(
+            "other engine: 90 % intervals that hold the truth",
+            _mean(there),
+            len(there),
+            *wilson(sum(there), len(there)),
         ),
         _bounded("held-out error over noise, median", over, _median, 1.5, ceilings),
         _bounded("other engine: held-out error after over before, median", left, _median, 0.5),
