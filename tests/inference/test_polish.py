@@ -36,6 +36,9 @@ def test_whether_more_evaluations_would_gain_anything_is_told() -> None:
     assert polish(Linear(2.0), np.array([0.1, 0.1])).rested
     assert not polish(Bent(2.0), np.array([0.1, 0.9]), 5).rested
     assert not polish(Linear(2.0), np.array([0.1, 0.1]), roughly=True).rested
+    limits = [polish(Bent(2.0), np.array([0.1, 0.9]), k) for k in range(4, 40)]
+    best = min(found.rss for found in limits)
+    assert all(found.rss < best + 3.0 for found in limits if found.rested)  # wherever the budget ended
 
 
 class TwoValleys(Linear):
