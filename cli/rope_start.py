@@ -10,8 +10,8 @@ from .study_plan import Plan
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
 #: and the way from one to the next as long at most, over the shortest tree through them.
 _FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
-#: A rope that sags by this share of its length sags down, in the mean over its takes, to so many degrees: in 56 takes
-#: each of three cables, one of which keeps a bend, single takes do to 17.
+#: A rope that sags by this share of its length sags down, in the mean over its takes, to so many degrees: one that
+#: keeps a bend, or is swung, sags aside by far less.
 _SAGS, _ASIDE = 0.05, 60.0
 
 

@@ -25,10 +25,12 @@ COLUMNS = {
     "coefficients: 90 % intervals that hold the truth": "coefficients within their 90 % intervals",
 }
 
+LARGER = "names that make the held-out error larger"
+
 
 def batches() -> list[str]:
     """The table as lines of Markdown."""
-    heads = ["first seed", "commit", "cases", *COLUMNS.values()]
+    heads = ["first seed", "commit", "cases", *COLUMNS.values(), LARGER]
     lines = [row(heads), "|---" * len(heads) + "|"]
     for path in sorted(RESULTS.glob("effects*.json"), key=_first_seed):
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -37,8 +39,13 @@ def batches() -> list[str]:
         found = {f["name"]: f for f in content["figures"]}
         ended = sum("verdict" in c for c in content["cases"])
         shares = [_share(found[name]) for name in COLUMNS]
-        lines.append(row([str(content["seeds"][0]), content["commit"], str(ended), *shares]))
+        lines.append(row([str(content["seeds"][0]), content["commit"], str(ended), *shares, _larger(content["cases"])]))
     return lines
+
+
+def _larger(cases: list[dict[str, Any]]) -> str:
+    errors = [c["error"] for c in cases if c.get("verdict") in ("named", "tied")]
+    return f"{sum(e['after'] > e['before'] for e in errors)} of {len(errors)}"
 
 
 def _first_seed(path: Path) -> int:

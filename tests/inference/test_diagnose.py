@@ -13,6 +13,7 @@ from test_verdict import COUNT, candidate, evidence
 from muslin.core.errors import InputError
 from muslin.core.study import Study
 from muslin.inference.criticism import work
+from muslin.inference.criticism.before_after import BeforeAfter
 from muslin.inference.criticism.diagnose import Diagnosis, _models
 from muslin.inference.polish import Objective, Polished
 from muslin.plugins.effects.air import AirDrag
@@ -80,6 +81,19 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     again = added.diagnose().result  # with the effect in the model nothing more is missing
     check_schema(again)
     assert again["effects"] == [] and again["verdict"] in ("no-misfit", "cannot-tell")
+
+
+@pytest.mark.slow
+def test_what_makes_a_users_held_out_error_larger_is_not_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As nothing that is right does so, the errors are made up."""
+    monkeypatch.setattr(BeforeAfter, "error", lambda self, names: (0.003, 0.004))
+    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))))
+    study.config.diagnose.candidates = ["air-drag"]
+    study.fit()
+    result = study.diagnose().result
+    assert (result["verdict"], result["effects"]) == ("none", [])
+    assert result["candidates"][0]["objection"] == "held-out"
+    assert result["error"]["after"] == result["error"]["before"]
 
 
 @pytest.mark.slow

@@ -65,6 +65,22 @@ def bench(polished: Callable[..., Polished]) -> tuple[SimpleNamespace, _Tourname
     return work, _Tournament(work, (), plain, {"drag": look}, {})  # type: ignore[arg-type]
 
 
+def searching(left: Callable[[FloatArray], float], reached: float = 1.0) -> tuple[_Tournament, list[FloatArray]]:
+    """A tournament in which every residual is ``left`` at a point, and the list of where its fits start.
+
+    They all reach ``reached`` [what noise leaves].
+    """
+    starts: list[FloatArray] = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
+        starts.append(unit)
+        return candidate("drag", reached * COUNT).fit
+
+    work, tournament = bench(polished)
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), left(p)) for p in points])
+    return tournament, starts
+
+
 def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
     refitted = []
 
@@ -90,16 +106,7 @@ def test_a_candidate_that_the_budget_does_not_come_to_is_not_tried(spent: bool) 
 
 @pytest.mark.parametrize(("from_there", "reached"), [(1.0, 1.0), (3.0, 2.0)])
 def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_there: float, reached: float) -> None:
-    starts: list[FloatArray] = []
-
-    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
-        starts.append(unit)
-        return candidate("drag", from_there * COUNT).fit
-
-    work, tournament = bench(polished)
-    work.objective = lambda effects: SimpleNamespace(
-        many=lambda points: [np.full(int(COUNT), 2.0 if p[1] == 0.8 else 3.0) for p in points]
-    )
+    tournament, starts = searching(lambda p: 2.0 if p[1] == 0.8 else 3.0, from_there)
     hints = np.array([[0.5, 0.2], [0.5, 0.8]])
     tournament.hints = {"drag": hints}
     (found,) = tournament.run()
@@ -123,33 +130,15 @@ def test_the_parameters_make_up_for_an_effect_before_it_is_judged() -> None:
 
 
 def test_a_search_goes_on_from_where_the_parameters_make_up_for_an_effect() -> None:
-    starts: list[FloatArray] = []
-
-    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
-        starts.append(unit)
-        return candidate("drag", COUNT).fit
-
-    work, tournament = bench(polished)
     # the effect does harm, which a parameter far below all that is screened makes up for
-    work.objective = lambda effects: SimpleNamespace(
-        many=lambda points: [np.full(int(COUNT), 0.5 if p[0] < 0.01 < p[1] else 3.0) for p in points]
-    )
+    tournament, starts = searching(lambda p: 0.5 if p[0] < 0.01 < p[1] else 3.0)
     tournament.run()
     assert starts[0][0] < 0.01 < starts[0][1]
 
 
 def test_the_first_screening_looks_across_a_kink() -> None:
     """A little of the effect makes the cloth fold the other way, which is worse; more of it is right."""
-    starts: list[FloatArray] = []
-
-    def polished(effects: tuple[str, ...], unit: FloatArray, *_: object) -> Polished:
-        starts.append(unit)
-        return candidate("drag", COUNT).fit
-
-    work, tournament = bench(polished)
-    work.objective = lambda effects: SimpleNamespace(
-        many=lambda points: [np.full(int(COUNT), 1.1 if 0.35 < p[1] < 0.45 and p[0] == 0.5 else 3.0) for p in points]
-    )
+    tournament, starts = searching(lambda p: 1.1 if 0.35 < p[1] < 0.45 and p[0] == 0.5 else 3.0)
     tournament.run()
     assert starts[0] == pytest.approx(np.array([0.5, 0.4]))
 
