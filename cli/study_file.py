@@ -12,7 +12,7 @@ from ..core.material import UNITS
 from ..core.obstacles import Obstacle
 from ..core.registry import REGISTRY
 from ..core.scenarios import SIZES, preset
-from ..core.scenarios.measured import MEASURED_STEP, MEASURED_TAILS
+from ..core.scenarios.measured import MEASURED_TAILS
 from ..core.study.config import DiagnoseTable, EstimatorTable
 from .study_plan import Plan
 
@@ -170,7 +170,7 @@ def _inline(tables: list[dict[str, Any]]) -> str:
 def _plugins(plan: Plan) -> str:
     own = {}
     if usual := REGISTRY.get("simulator", plan.simulator).usual_steps.get(plan.kind):
-        own = {"time_step": max(usual, MEASURED_STEP) if plan.start else usual}
+        own = {"time_step": usual}
     options = "".join(f"{line}\n" for line in _options("simulator", plan.simulator, own))
     default = EstimatorTable(name=plan.estimator)
     return f"""

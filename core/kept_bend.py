@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import nnls
 
 from .arrays import FloatArray
 from .bending import RopeBending
@@ -14,6 +15,10 @@ from .scene import Scene
 _RANK = 1e-9
 #: What less than this share of the states tell is hardly told.
 _HARDLY = 0.03
+#: How often states are weighed anew, how near their weights must come to end that, and squares that are none.
+_ROUNDS, _NEAR, _NOTHING = 20, 0.01, 1e-12
+#: What states are off by is told apart from chance as under Student's distribution of so many degrees of freedom.
+_FREEDOM = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,20 +68,49 @@ class StateBend:
         return StateBend(least, np.einsum("naw,nab->nbw", self.ways, turn), self.measures)
 
 
-def common_bend(states: Sequence[StateBend]) -> KeptBend:
-    """The one bend that all ``states`` of a rope tell together, in axes that are the same in all.
+def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
+    r"""The one bend that all ``states`` of a rope tell together, in axes that are the same in all.
 
     Each tells it but for its ways, which are other ones where the rope lies otherwise, so together they tell more
     than any one does; the mean of the smallest bends falls short by what each leaves open. What hardly any state tells,
     as an even bend between two clamps, stays as small as it may be: the states' errors would fill it otherwise.
+
+    States do not tell it equally well: where a rope whips, or markers went wrong, they are far from the others. So a
+    state that is r off counts by :math:`1 / (r^2 + 3\, \text{median } r^2)`, much as under Student's distribution of
+    three degrees of freedom, by the damping time and the mass over stiffness that leave least.
+
+    Args:
+        states: that the rope was seen in.
+        gravity: under which it was ``(3,)`` [m/s2].
     """
-    weights = [np.sqrt(np.repeat(s.measures, 2))[:, None] for s in states]
-    count = len(weights[0])
-    told = np.mean([w * _columns(s.least) for w, s in zip(weights, states, strict=True)], axis=0)
-    ways = [w * s.ways.reshape(count, -1) for w, s in zip(weights, states, strict=True)]
-    seen = np.eye(count) - np.mean([w @ w.T for w in ways], axis=0)
-    common = np.linalg.solve(seen + _HARDLY * np.eye(count), (1.0 + _HARDLY) * told)
-    return _from_columns(common / np.mean(weights, axis=0))
+    measures = states[0].measures
+    weight = np.sqrt(np.repeat(measures, 2))[:, None]
+    told = np.stack([weight * _columns(s.least) for s in states])
+    ways = (weight * s.ways.reshape(len(weight), -1) for s in states)
+    seen = np.stack([np.eye(len(weight)) - w @ w.T for w in ways])
+    counts, common = np.ones(len(states)), np.zeros(told.shape[1:])
+    for _ in range(_ROUNDS):
+        share = counts / counts.sum()
+        least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(len(weight))
+        common = np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1))
+        squares = _squares(seen @ (told - common), share, gravity)
+        before, counts = counts, 1.0 / np.maximum(squares + _FREEDOM * np.median(squares), _NOTHING)
+        if np.allclose(counts, before, rtol=_NEAR):
+            break
+    return _from_columns(common / weight)
+
+
+def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatArray:
+    """By how much states are off ``(S,)``, of what they are off by in all that a bend is made of ``(S, N, 10)``.
+
+    Damping time and mass over stiffness are those that leave least where states count by their ``share (S,)``.
+    """
+    pushes = np.concatenate([[1.0], -gravity])
+    shape, rates, carried = off[..., 0], off[..., 1], off[..., 2:].reshape(*off.shape[:2], 2, 4) @ pushes
+    made = np.concatenate([rates[..., None], -carried], axis=2)
+    root = np.sqrt(share)[:, None]
+    sizes, _ = nnls((root[..., None] * made).reshape(-1, 3), -(root * shape).ravel())
+    return np.asarray(np.sum((shape + made @ sizes) ** 2, axis=1))
 
 
 def _columns(bend: KeptBend) -> FloatArray:

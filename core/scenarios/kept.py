@@ -14,15 +14,13 @@ from ..material import RopeMaterial
 from ..measurement import Recording
 from ..motion import inverse, rotate
 from ..rest_shape import rolled_out
-from ..scenario import Scenario
+from ..scenario import STANDARD_GRAVITY, Scenario
 from .measured import measured_start
 
 #: States of a rope are taken so far apart [s]: nearer ones show the same bends.
-_APART = 0.5
+_APART = 0.1
 #: So many frames after a state tell how it moves there.
 _FRAMES = 10
-#: A state that is so many times as far from the median as half of them are is that of markers gone wrong.
-_FAR = 6.0
 _ANY = RopeMaterial(linear_density=1.0, stretch_stiffness=1.0, bending_rigidity=1.0)
 
 
@@ -30,7 +28,7 @@ def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) ->
     """What states all along ``recordings`` of one rope tell together, in the frames of the material.
 
     A natural curvature is a property of the rope and turns with its material, which the first gripper holds; what
-    friction between its strands and errors of the markers add differs from state to state. States far off are left out.
+    friction between its strands and errors of the markers add differs from state to state, so those far off count less.
 
     Args:
         scenarios: of the recordings, each of which starts as it was measured.
@@ -42,11 +40,7 @@ def told_bend(scenarios: Sequence[Scenario], recordings: Sequence[Recording]) ->
     if not all(s.grasps and s.body.kind == "rope" and len(s.body.vertices) > 2 for s in scenarios):
         return None
     states = [state for s, r in zip(scenarios, recordings, strict=True) for state in _states(s, r)]
-    told = [_told(s) for s in states]
-    shapes = np.array([t.least.shape for t in told])
-    away = np.sqrt(np.mean((shapes - np.median(shapes, axis=0)) ** 2, axis=(1, 2)))
-    usual = _FAR * float(np.median(away))
-    return common_bend([t for t, a in zip(told, away, strict=True) if a <= usual])
+    return common_bend([_told(s) for s in states], np.array([0.0, 0.0, -STANDARD_GRAVITY]))
 
 
 def bent(scenario: Scenario, curvature: FloatArray) -> Body:
@@ -68,14 +62,17 @@ def _states(scenario: Scenario, recording: Recording) -> list[Scenario]:
     apart = np.linalg.norm(np.diff(series.points, axis=1), axis=2)
     whole = (apart > 0).all(axis=1)  # a comparison with NaN is false
     late = np.floor((series.time - series.time[0]) / _APART + 1e-9)
-    out = [scenario]
+    out, beside = [scenario], scenario.beside
+    if beside is not None:
+        series = replace(series, points=beside.axis(series.points, scenario.motion.at(series.time)))
     for part in np.unique(late)[1:]:
         found = np.flatnonzero(whole & (late == part))
         if not len(found) or found[0] + _FRAMES > len(series.time):
             continue
         rest = slice(found[0], None)
         cut = replace(recording, series=replace(series, time=series.time[rest], points=series.points[rest]))
-        out.append(measured_start(replace(scenario, times=series.time[rest]), cut, scenario.beside))
+        state = measured_start(replace(scenario, times=series.time[rest]), cut)
+        out.append(replace(state, beside=beside))
     return out
 
 

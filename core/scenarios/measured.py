@@ -24,9 +24,6 @@ MEASURED_PRIORS = (
     Parameter("twist_rigidity", "N m2", 1e-5, 0.1, "log", "torque per twist rate"),
     Parameter("damping_time", "s", 1e-4, 1.0, "log", "of internal damping, C = beta K"),
 )
-#: Takes of a rope in motion are long, so steps of a new study are no shorter than this [s]. Longer ones do not do:
-#: MuJoCo's own damping then stands in for the rope's.
-MEASURED_STEP = 0.0025
 #: How near the model of a rope in motion is meant to come [m], where it is seen far better. Held against the noise of
 #: motion capture alone, every draw is as wrong as every other, and frames count as left to chance.
 MEASURED_NEAR = 0.005

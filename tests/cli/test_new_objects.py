@@ -12,7 +12,7 @@ from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.motion import Motion
 from muslin.core.registry import REGISTRY
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_STEP, MEASURED_TAILS
+from muslin.core.scenarios.measured import MEASURED_NEAR, MEASURED_TAILS
 from muslin.core.series import PointSeries
 from muslin.core.study import build_problem, read_config
 
@@ -62,7 +62,7 @@ def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
     assert "every take starts through its markers" in capsys.readouterr().out
     config = read_config(path)
     assert config.scenario.start == "measured" and config.scenario.size is None and config.scenario.markers is None
-    assert config.simulator.options["time_step"] == MEASURED_STEP
+    assert config.simulator.options["time_step"] == REGISTRY.get("simulator", "mujoco").usual_steps["rope"]
     assert list(config.parameters) == ["bending_rigidity", "twist_rigidity", "damping_time"]
     problem = build_problem(config, load_measurement(measurement), tmp_path)
     middle = problem.space.as_dict(problem.space.from_unit(np.full(3, 0.5)))
@@ -71,7 +71,6 @@ def test_a_rope_that_is_seen_from_gripper_to_gripper_starts_as_measured(
     assert status("new", path, "--measurement", measurement, "--scenario", "cable", "--size", "0.8", "--force") == 0
     config = read_config(path)
     assert config.scenario.start is None
-    assert config.simulator.options["time_step"] == REGISTRY.get("simulator", "mujoco").usual_steps["rope"]
 
 
 @pytest.mark.parametrize(

@@ -162,16 +162,28 @@ def test_states_tell_together_what_each_leaves_open() -> None:
     kept = np.outer(3.0 * np.cos(2 * np.pi * np.linspace(0.0, 1.0, 24)), [1.0, 1.0])
     states = states_of(kept, 40)
     each = np.array([s.least.curvature(MATERIAL, gravity) for s in states])
-    np.testing.assert_allclose(common_bend(states[:1]).curvature(MATERIAL, gravity), each[0], atol=1e-9)
-    np.testing.assert_allclose(common_bend(states[:1] * 20).curvature(MATERIAL, gravity), each[0], atol=1e-9)
+    np.testing.assert_allclose(common_bend(states[:1], gravity).curvature(MATERIAL, gravity), each[0], atol=1e-9)
+    np.testing.assert_allclose(common_bend(states[:1] * 20, gravity).curvature(MATERIAL, gravity), each[0], atol=1e-9)
     assert rms(each.mean(axis=0) - kept) > 0.2 * rms(kept)
-    assert rms(common_bend(states).curvature(MATERIAL, gravity) - kept) < 0.05 * rms(kept)
+    assert rms(common_bend(states, gravity).curvature(MATERIAL, gravity) - kept) < 0.05 * rms(kept)
 
 
 def test_what_hardly_any_state_tells_is_not_filled_with_their_errors() -> None:
     """An even bend of a rope that two clamps hold is such: they take it up, however the rope lies."""
-    told = common_bend(states_of(np.tile([0.0, 1.0], (24, 1)), 40, errors=1.0))
-    assert rms(told.curvature(MATERIAL, np.array([0.0, 0.0, -9.81]))) < 0.5
+    gravity = np.array([0.0, 0.0, -9.81])
+    told = common_bend(states_of(np.tile([0.0, 1.0], (24, 1)), 40, errors=1.0), gravity)
+    assert rms(told.curvature(MATERIAL, gravity)) < 0.5
+
+
+def test_states_that_are_far_off_hardly_count() -> None:
+    """As those in which a rope whips: they must not take away from what the others tell."""
+    gravity = np.array([0.0, 0.0, -9.81])
+    kept = np.outer(3.0 * np.cos(2 * np.pi * np.linspace(0.0, 1.0, 24)), [1.0, 1.0])
+    good, wild = states_of(kept, 40), states_of(kept, 10, errors=10.0)
+    alone = rms(common_bend(wild, gravity).curvature(MATERIAL, gravity) - kept)
+    together = rms(common_bend(good + wild, gravity).curvature(MATERIAL, gravity) - kept)
+    assert together < 0.1 * rms(kept)  # of equal weight, they would add a fifth of what they are off by themselves
+    assert 0.2 * alone > 0.2 * rms(kept)
 
 
 def test_a_rope_that_no_gripper_holds_tells_nothing() -> None:
