@@ -88,7 +88,8 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
     told = np.stack([weight * _columns(s.least) for s in states])
     ways = (weight * s.ways.reshape(len(weight), -1) for s in states)
     seen = np.stack([np.eye(len(weight)) - w @ w.T for w in ways])
-    counts, common = np.ones(len(states)), np.zeros(told.shape[1:])
+    counts: FloatArray = np.ones(len(states))
+    common: FloatArray = np.zeros(told.shape[1:])
     for _ in range(_ROUNDS):
         share = counts / counts.sum()
         least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(len(weight))
