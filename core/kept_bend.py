@@ -93,7 +93,7 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
     for _ in range(_ROUNDS):
         share = counts / counts.sum()
         least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(len(weight))
-        common = np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1))
+        common = np.asarray(np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1)), np.float64)
         squares = _squares(seen @ (told - common), share, gravity)
         before, counts = counts, 1.0 / np.maximum(squares + _FREEDOM * np.median(squares), _NOTHING)
         if np.allclose(counts, before, rtol=_NEAR):
