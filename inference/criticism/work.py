@@ -9,7 +9,8 @@ from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import Discrepancy
-from ..polish import Objective, Polished, polish
+from ..numerics_seen import seen_past_numerics
+from ..polish import Objective, Polished, curvature, polish
 from ..residuals import Residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
@@ -162,10 +163,14 @@ class Work:
         has = set(self.problem.space.names)
         return tuple(dict.fromkeys(n.split(".", 1)[0] for n in candidate.space.names if "." in n and n not in has))
 
-    def past_chance(self, candidate: Candidate) -> Candidate:
-        """With a covariance that holds where the model cannot be repeated, too."""
+    def surely(self, candidate: Candidate) -> Candidate:
+        """With a covariance that holds where the model cannot be repeated, and where its numbers are off."""
         effects = self._effects_of(candidate)
-        seen = seen_past_chance(self.objective(effects), self._again(effects, candidate.fit))
+        objective, fit = self.objective(effects), self._again(effects, candidate.fit)
+        seen = seen_past_chance(objective, fit)
+        if seen is fit:
+            jacobian = objective.jacobian(fit.unit, fit.white)  # by the numerics as last seen
+            seen = seen_past_numerics(objective, replace(fit, jacobian=jacobian, covariance=curvature(jacobian)))
         return replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
