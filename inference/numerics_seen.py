@@ -13,6 +13,8 @@ SIZES = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0)
 _ROUNDING = 1e-9
 #: Directions of which parameters take up all but this are theirs.
 _TAKEN_UP = 1e-3
+#: No standard deviation becomes less than this share of what it was.
+_NARROWEST = 0.1
 
 
 def seen_past_numerics(objective: Objective, best: Polished) -> Polished:
@@ -35,11 +37,12 @@ def seen_past_numerics(objective: Objective, best: Polished) -> Polished:
     along, sizes = parts
     ratios = np.array([(1.0 + t**2 * sizes**2) / (1.0 + sizes**2) - 1.0 for t in SIZES])
     excess = _likely(along, best, ratios) @ ratios
-    moved = along.T @ best.jacobian
-    information = best.jacobian.T @ best.jacobian + (moved * excess[:, None]).T @ moved
-    # the uniform prior of a unit interval has variance 1/12
-    middle = information + 12.0 * np.eye(len(best.unit))
-    return replace(best, covariance=np.asarray(best.covariance @ middle @ best.covariance, float))
+    root = np.linalg.cholesky(best.covariance)
+    moved = along.T @ best.jacobian @ root
+    # where derivatives are of chance, too, more could be taken off than there is
+    shares, ways = np.linalg.eigh((moved * excess[:, None]).T @ moved)
+    widths = root @ ways * np.sqrt(1.0 + np.maximum(shares, _NARROWEST**2 - 1.0))
+    return replace(best, covariance=np.asarray(widths @ widths.T, float))
 
 
 def _likely(along: FloatArray, best: Polished, ratios: FloatArray) -> FloatArray:

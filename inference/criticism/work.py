@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -167,10 +168,9 @@ class Work:
         """With a covariance that holds where the model cannot be repeated, and where its numbers are off."""
         effects = self._effects_of(candidate)
         objective, fit = self.objective(effects), self._again(effects, candidate.fit)
-        seen = seen_past_chance(objective, fit)
-        if seen is fit:
-            jacobian = objective.jacobian(fit.unit, fit.white)  # by the numerics as last seen
-            seen = seen_past_numerics(objective, replace(fit, jacobian=jacobian, covariance=curvature(jacobian)))
+        jacobian = objective.jacobian(fit.unit, fit.white)  # by the numerics as last seen
+        fit = replace(fit, jacobian=jacobian, covariance=curvature(jacobian))
+        seen = seen_past_chance(objective, fit, partial(seen_past_numerics, objective))
         return replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
