@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from ..core.arrays import FloatArray
 
@@ -52,16 +51,6 @@ class Discrepancy:
     def _scale(self, recording: str, like: FloatArray) -> FloatArray:
         v = self.chance.get(recording, np.zeros_like(like))
         return np.asarray(np.where(v > MOST_CHANCE, 0.0, 1.0 / np.sqrt(1.0 + v)))
-
-    def along(self, recordings: Sequence[str]) -> Factors | None:
-        """Orthonormal directions of the residuals of ``recordings``, one after the other, and their sizes.
-
-        None where not each of them has directions.
-        """
-        if not all(name in self.directions for name in recordings):
-            return None
-        each = [self._factors[name] for name in recordings]
-        return block_diag(*(u for u, _ in each)), np.concatenate([s for _, s in each])
 
     def dropped(self, recordings: Sequence[str]) -> int:
         """How many of the residuals of ``recordings`` do not count."""

@@ -174,14 +174,10 @@ def polish(
         best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
         used += more + len(start)
         rested = before - best.rss < CHANCE * enough * best.rss  # so near that the derivatives hold
-    return Polished(best.unit, best.white, jacobian, curvature(jacobian), count, rested)
-
-
-def curvature(jacobian: FloatArray) -> FloatArray:
-    """The covariance ``(D, D)`` of a best fit at which the white residuals have this Jacobian ``(N, D)`` (Laplace)."""
     # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
-    information = jacobian.T @ jacobian + 12.0 * np.eye(jacobian.shape[1])
-    return np.asarray(np.linalg.inv(information), float)
+    information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
+    covariance = np.asarray(np.linalg.inv(information), float)
+    return Polished(best.unit, best.white, jacobian, covariance, count, rested)
 
 
 def polish_from(objective: Objective, starts: FloatArray) -> Polished:

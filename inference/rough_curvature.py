@@ -5,7 +5,7 @@ there, so large that every parameter seems known to a ten-thousandth of its rang
 chance is kind, not where the parameters are right.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,9 +38,7 @@ class _Difference:
         return float(self.slope @ self.slope) >= CLEAR * self.chance
 
 
-def seen_past_chance(
-    objective: Objective, best: Polished, further: Callable[[Polished], Polished] = lambda fit: fit
-) -> Polished:
+def seen_past_chance(objective: Objective, best: Polished) -> Polished:
     """The same fit with a covariance that holds where the model cannot be repeated; where it can, it is as it was.
 
     With ``w(x)`` at three points, ``d = w(x + h) - w(x - h)`` and ``e = w(x + h) + w(x - h) - 2 w(x)``, chance ``c`` of
@@ -48,28 +46,27 @@ def seen_past_chance(
     former, and ``h`` grows until little is to be taken off (Moré and Wild, *Estimating derivatives of noisy
     simulations*, 2012). The square sum then is a parabola and chance on top, which shows in ``w e + |e|^2 / 4``, by
     how much the neighbours leave more than a parabola would. A search goes where that is least, as far from the bottom
-    of the parabola as it pays, so the covariance grows by the root mean square of it.
+    of the parabola as it pays. What it pays, the root mean square of it, is shared by the D parameters, so the
+    covariance grows by a D-th of that.
 
     Args:
         objective: that was made least.
         best: where, its derivatives by one-sided differences over the step of the objective's discrepancy.
-        further: what else becomes of a covariance that is told by derivatives, before it grows.
     """
     discrepancy = objective.discrepancy
     chance = 2.0 * discrepancy.left_to_chance(objective.recordings) / discrepancy.step**2
     if bool((np.sum(best.jacobian**2, axis=0) >= CLEAR * chance).all()):
-        return further(best)
+        return best
     found = [list(_wider_and_wider(objective, best, k)) for k in range(len(best.unit))]
     if not all(found):  # next to it nothing can be simulated, so there is nothing better than the derivatives
-        return further(best)
+        return best
     jacobian = np.stack([differences[-1].slope for differences in found], axis=1)
     information = jacobian.T @ jacobian - np.diag([differences[-1].chance for differences in found])
     values, vectors = np.linalg.eigh(information)
     # the uniform prior of a unit interval has variance 1/12
     covariance = (vectors / (np.maximum(values, 0.0) + 12.0)) @ vectors.T
-    covariance = further(replace(best, jacobian=jacobian, covariance=covariance)).covariance
     luck = float(np.sqrt(np.mean([differences[0].luck ** 2 for differences in found])))
-    grown = (1.0 + luck) * covariance
+    grown = (1.0 + luck / len(best.unit)) * covariance
     scale = np.sqrt(np.minimum(1.0, 1.0 / 12.0 / np.diag(grown)))  # no less is known than the prior says
     return replace(best, covariance=np.asarray(grown * np.outer(scale, scale), float))
 

@@ -74,8 +74,8 @@ def diagnose(study: Study) -> Diagnosis:
 def _surely(work: Work, found: Findings) -> dict[str, Candidate]:
     """The models whose coefficients are told, by effect, with what is known of them where chance moves them, too."""
     if found.verdict == "named":
-        return dict.fromkeys(found.effects, work.surely(found.after))
-    return {n: work.surely(found.first.candidate(n)) for n in found.effects}
+        return dict.fromkeys(found.effects, work.past_chance(found.after))
+    return {n: work.past_chance(found.first.candidate(n)) for n in found.effects}
 
 
 def _fitted(study: Study) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -10,8 +9,7 @@ from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import Discrepancy
-from ..numerics_seen import seen_past_numerics
-from ..polish import Objective, Polished, curvature, polish
+from ..polish import Objective, Polished, polish
 from ..residuals import Residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
@@ -164,13 +162,10 @@ class Work:
         has = set(self.problem.space.names)
         return tuple(dict.fromkeys(n.split(".", 1)[0] for n in candidate.space.names if "." in n and n not in has))
 
-    def surely(self, candidate: Candidate) -> Candidate:
-        """With a covariance that holds where the model cannot be repeated, and where its numbers are off."""
+    def past_chance(self, candidate: Candidate) -> Candidate:
+        """With a covariance that holds where the model cannot be repeated, too."""
         effects = self._effects_of(candidate)
-        objective, fit = self.objective(effects), self._again(effects, candidate.fit)
-        jacobian = objective.jacobian(fit.unit, fit.white)  # by the numerics as last seen
-        fit = replace(fit, jacobian=jacobian, covariance=curvature(jacobian))
-        seen = seen_past_chance(objective, fit, partial(seen_past_numerics, objective))
+        seen = seen_past_chance(self.objective(effects), self._again(effects, candidate.fit))
         return replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:

@@ -47,7 +47,7 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
 ) -> None:
     told = list[Polished]()
 
-    def past_chance(objective: Objective, best: Polished, further: object) -> Polished:
+    def past_chance(objective: Objective, best: Polished) -> Polished:
         told.append(replace(best, covariance=4.0 * best.covariance))  # as if chance had a hand in it
         return told[-1]
 

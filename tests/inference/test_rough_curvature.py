@@ -16,24 +16,25 @@ from muslin.inference.residuals import Offsets
 from muslin.inference.rough_curvature import seen_past_chance
 from muslin.inference.roughness import roughness
 
-COUNT, TRUTH = 60, np.array([0.35, 0.6])
+COUNT, TRUTH = 60, np.array([0.35, 0.6, 0.4, 0.55, 0.5, 0.45])
 
 
 class Rough(Objective):
-    """Residuals that are linear in two parameters, noise, and a chance that no neighbour shares.
+    """Residuals that are linear in a few parameters, noise, and a chance that no neighbour shares.
 
     Args:
         seed: of the problem.
         size: standard deviation of chance, in units of the noise.
+        parameters: how many.
     """
 
-    def __init__(self, seed: int, size: float) -> None:
-        space = ParameterSpace((Parameter("a", "1", 0, 1), Parameter("b", "1", 0, 1)))
+    def __init__(self, seed: int, size: float, parameters: int = 2) -> None:
+        space = ParameterSpace(tuple(Parameter(name, "1", 0, 1) for name in "abcdef"[:parameters]))
         discrepancy = Discrepancy(chance={"all": np.full(COUNT, size**2)})
         super().__init__(None, space, ["all"], Noise(1.0, 0.0, "test", "m", 0.01), Offsets(), discrepancy=discrepancy)  # type: ignore[arg-type]
         rng = np.random.default_rng(seed)
         self.seed, self.size = seed, size
-        self.matrix, self.error = rng.normal(size=(COUNT, 2)) * 5, rng.normal(size=COUNT)
+        self.matrix, self.error = rng.normal(size=(COUNT, parameters)) * 5, rng.normal(size=COUNT)
 
     wall = 1.0
 
@@ -42,17 +43,17 @@ class Rough(Objective):
 
     def raw(self, unit: FloatArray) -> FloatArray:
         chance = np.random.default_rng([self.seed, *unit.view(np.uint64).tolist()]).normal(size=COUNT)
-        return np.asarray(self.matrix @ (unit - TRUTH) + self.error + self.size * chance)
+        return np.asarray(self.matrix @ (unit - TRUTH[: len(unit)]) + self.error + self.size * chance)
 
 
-def away(size: float, *, wide: bool) -> FloatArray:
-    """How far estimates are from the truth [standard deviations] ``(40, 2)``."""
+def away(size: float, *, wide: bool, parameters: int = 2) -> FloatArray:
+    """How far estimates are from the truth [standard deviations] ``(40, D)``."""
     found = []
     for seed in range(40):
-        objective = Rough(seed, size)
-        best = polish(objective, np.array([0.5, 0.5]))
+        objective = Rough(seed, size, parameters)
+        best = polish(objective, np.full(parameters, 0.5))
         best = seen_past_chance(objective, best) if wide else best
-        found.append((best.unit - TRUTH) / np.sqrt(np.diag(best.covariance)))
+        found.append((best.unit - TRUTH[:parameters]) / np.sqrt(np.diag(best.covariance)))
     return np.array(found)
 
 
@@ -61,6 +62,13 @@ def test_intervals_hold_the_truth_where_chance_decides() -> None:
     held = np.mean(np.abs(away(0.4, wide=True)) < 1.645)
     assert held > 0.85
     assert np.std(away(0.4, wide=True)) > 0.15  # and not by saying nothing
+
+
+@pytest.mark.parametrize("size", [0.2, 0.6])
+def test_intervals_are_no_wider_for_more_parameters(size: float) -> None:
+    found = away(size, wide=True, parameters=6)
+    assert np.mean(np.abs(found) < 1.645) > 0.85
+    assert np.std(found) > 0.6
 
 
 def test_nothing_changes_where_there_is_no_chance() -> None:
