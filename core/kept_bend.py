@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from .arrays import FloatArray
 from .bending import RopeBending
@@ -110,7 +109,12 @@ def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatAr
     shape, rates, carried = off[..., 0], off[..., 1], off[..., 2:].reshape(*off.shape[:2], 2, 4) @ pushes
     made = np.concatenate([rates[..., None], -carried], axis=2)
     root = np.sqrt(share)[:, None]
-    sizes, _ = nnls((root[..., None] * made).reshape(-1, 3), -(root * shape).ravel())
+    columns, wanted = (root[..., None] * made).reshape(-1, 3), -(root * shape).ravel()
+    sizes, kept = np.full(3, -1.0), np.ones(3, np.bool_)
+    while (sizes < 0.0).any():  # none of them can be negative
+        sizes = np.zeros(3)
+        sizes[kept] = np.linalg.lstsq(columns[:, kept], wanted, rcond=None)[0]
+        kept &= sizes > 0.0
     return np.asarray(np.sum((shape + made @ sizes) ** 2, axis=1))
 
 
