@@ -2,6 +2,8 @@
 
 from typing import ClassVar
 
+import numpy as np
+
 from ...core.arrays import FloatArray
 from ...core.body import Body
 from ...core.effect import Effect
@@ -20,6 +22,10 @@ class RestCurvature(Effect):
     :func:`~muslin.core.scenarios.kept.told_bend`. The simulator is given a rope that is bent by ``share`` times that
     where nothing acts on it: 1 is in balance in the mean.
 
+    What hardly any state tells is a bend that is even along a rope between two clamps, as that of a spool on which it
+    was stored: the clamps hold it straight, and their moments, which nobody measures, are much the same in all states.
+    How it moves does tell. So that part has coefficients of its own, which come on top.
+
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
         inverse dynamic curves*, 2010, for rods; the accelerations and what states tell together are added here.
@@ -32,10 +38,13 @@ class RestCurvature(Effect):
     needs_kept_bend: ClassVar[bool] = True
     coefficients: ClassVar[tuple[Parameter, ...]] = (
         Parameter("share", "1", 0.0, 1.5, description="of the curvature that is in balance with what was seen"),
+        Parameter("even_about_z", "1/m", -5.0, 5.0, description="even curvature about the first gripper's z axis"),
+        Parameter("even_about_side", "1/m", -5.0, 5.0, description="that about the axis across the rope and z"),
     )
     symptom: ClassVar[str] = "straightens in the model where the real one keeps a bend"
 
     def on_body(self, scenario: Scenario, material: Material, gravity: FloatArray) -> Body:
         if scenario.kept is None or not isinstance(material, RopeMaterial):
             return scenario.body
-        return bent(scenario, self.values["share"] * scenario.kept.curvature(material, gravity))
+        even = np.array([self.values["even_about_z"], self.values["even_about_side"]])
+        return bent(scenario, self.values["share"] * scenario.kept.curvature(material, gravity) + even)

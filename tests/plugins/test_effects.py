@@ -45,7 +45,12 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "hem": ("mass", "on_loads", "cloth", {"line_mass": "kg/m"}),
     "internal-damping": ("material", "on_material", ALL, {"damping_time": "s"}),
     "rope-hysteresis": ("force", "bind", "rope", {"sliding_share": "1", "slip_curvature": "1/m"}),
-    "rest-curvature": ("material", "on_body", "rope", {"share": "1"}),
+    "rest-curvature": (
+        "material",
+        "on_body",
+        "rope",
+        {"share": "1", "even_about_z": "1/m", "even_about_side": "1/m"},
+    ),
     "law": ("force", "bind", ALL, {c.name: c.unit for c in Law.coefficients}),
     "stick-slip": ("contact", "bind", ALL, {"excess": "1"}),
     "strain-stiffening": ("material", "bind_stiffness", "cloth rope", {"stiffening": "1"}),

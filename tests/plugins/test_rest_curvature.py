@@ -7,7 +7,7 @@ import pytest
 
 from muslin.backends.mujoco import MujocoSimulator
 from muslin.core.arrays import FloatArray
-from muslin.core.body import rope_line
+from muslin.core.body import Body, rope_line
 from muslin.core.effect import Effect
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Recording
@@ -29,14 +29,23 @@ def reality(moved: float) -> Recording:
     """A rope that is bent at rest as a half hoop of 0.3 m, held at both ends; one of them swings by ``moved`` [m]."""
     angle = np.linspace(0.0, 2.4, 25)
     bent = 0.3 * np.stack([np.sin(angle), 0.35 * (1 - np.cos(2 * angle)), np.cos(angle) - 1], axis=1)
-    body = rope_line(bent, 25)
-    swing = moved * np.sin(2 * np.pi * 1.2 * TIME)
-    ends = body.vertices[[0, -1]]
+    poses = held_still(rope_line(bent, 25))
+    poses[:, 1, 1] += moved * np.sin(2 * np.pi * 1.2 * TIME)
+    return take(bent, poses)
+
+
+def held_still(body: Body) -> FloatArray:
+    """Poses ``(T, 2, 7)`` of grippers at both ends of it."""
     poses = np.zeros((len(TIME), 2, 7))
     poses[..., 3] = 1.0
-    poses[:, :, :3] = ends
-    poses[:, 1, 1] += swing
-    local = replace(body, vertices=body.vertices - ends[0])
+    poses[:, :, :3] = body.vertices[[0, -1]]
+    return poses
+
+
+def take(bent: FloatArray, poses: FloatArray, engine: MujocoSimulator | None = None) -> Recording:
+    """A rope of this shape at rest, that hung still before the first of the poses."""
+    body = rope_line(bent, 25)
+    local = replace(body, vertices=body.vertices - body.vertices[0])
     scenario = Scenario(
         "bent",
         local,
@@ -47,7 +56,7 @@ def reality(moved: float) -> Recording:
         np.zeros(0, np.int64),
         settle=1.5,
     )
-    made = rollout(MujocoSimulator(), scenario, replace(MATERIAL, damping_time=0.01))
+    made = rollout(engine or MujocoSimulator(), scenario, replace(MATERIAL, damping_time=0.01))
     return Recording("take", made.series, scenario.motion)
 
 
@@ -70,6 +79,31 @@ def test_a_straight_rope_with_it_moves_as_the_bent_one(moved: float, part: float
 
     assert off(0.0) > 0.02
     assert off(1.0) < part * off(0.0)
+
+
+@pytest.mark.parametrize("turned", [1.0, 2.0])
+def test_an_even_bend_shows_as_clamps_turn_a_rope_though_no_state_tells_it(turned: float) -> None:
+    """Of an arc between two clamps: how much it turns in all is given by them, so its energy does not depend on it."""
+    angle = np.linspace(0.0, 1.8, 25)
+    arc = 0.5 * np.stack([np.sin(angle), 0.0 * angle, np.cos(angle) - 1], axis=1)  # bent by 2 1/m
+    poses = held_still(rope_line(arc, 25))
+    axis = poses[0, 1, :3] - poses[0, 0, :3]
+    half = 0.25 * turned * (1 - np.cos(2 * np.pi * 0.8 * TIME))[:, None, None]
+    poses[..., 3:4], poses[..., 4:] = np.cos(half), np.sin(half) * axis / np.linalg.norm(axis)
+    engine = MujocoSimulator(time_step=0.0025)
+    still, moving = take(arc, held_still(rope_line(arc, 25)), engine), take(arc, poses, engine)
+    material = replace(MATERIAL, damping_time=0.01)
+
+    def off(recording: Recording, about_side: float) -> float:
+        effects = [RestCurvature(even_about_side=about_side)]
+        made = rollout(engine, model(recording), material, effects)
+        return float(np.abs(made.series.points - recording.series.points).mean())
+
+    told = model(still).kept
+    assert told is not None
+    assert np.abs(told.curvature(material, np.array([0.0, 0.0, -9.81])).mean(axis=0)).max() < 0.05
+    assert abs(off(still, -2.0) - off(still, 0.0)) < 2e-4
+    assert off(moving, -2.0) < 0.6 * min(off(moving, 0.0), off(moving, 2.0))
 
 
 def test_it_is_offered_only_where_a_held_rope_was_seen_to_be_bent() -> None:
