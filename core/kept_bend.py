@@ -31,16 +31,18 @@ class KeptBend:
         rates: what the damping of a bend that changes adds to that, per damping time ``(N, 2)`` [1/(m s)].
         moments: that what it carries bends it by ``(2, 4, N, 2)``: the rope's own mass, at 1 kg/m,
             and the loads; first for their acceleration [N m], then for a gravity of -1 m/s2 along x, y and z each.
+        torsion: that its twist bends it by, at a twist rigidity of 1 N m2 ``(N, 2)`` [N m].
     """
 
     shape: FloatArray
     rates: FloatArray
     moments: FloatArray
+    torsion: FloatArray
 
     def curvature(self, material: RopeMaterial, gravity: FloatArray) -> FloatArray:
         """The natural curvature ``(N, 2)`` [1/m]; ``gravity (3,)`` [m/s2]."""
         carried = np.tensordot([material.linear_density, 1.0], self.moments, 1)
-        moments = carried[0] - np.tensordot(gravity, carried[1:], 1)
+        moments = carried[0] - np.tensordot(gravity, carried[1:], 1) + material.twist_rigidity * self.torsion
         return np.asarray(self.shape + material.damping_time * self.rates - moments / material.bending_rigidity)
 
 
@@ -63,7 +65,7 @@ class StateBend:
         """The same in other cross-section axes: from ``axes (N, 2, 3)`` into ``into (N, 2, 3)``."""
         turn = np.einsum("nax,nbx->nab", axes, into)
         old = self.least
-        least = KeptBend(*(np.einsum("...na,nab->...nb", x, turn) for x in (old.shape, old.rates, old.moments)))
+        least = KeptBend(*(np.einsum("...na,nab->...nb", x, turn) for x in _parts(old)))
         return StateBend(least, np.einsum("naw,nab->nbw", self.ways, turn), self.measures)
 
 
@@ -76,7 +78,7 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
 
     States do not tell it equally well: where a rope whips, or markers went wrong, they are far from the others. So a
     state that is r off counts by :math:`1 / (r^2 + 3\, \text{median } r^2)`, much as under Student's distribution of
-    three degrees of freedom, by the damping time and the mass over stiffness that leave least.
+    three degrees of freedom, by the damping time, mass over stiffness and ratio of stiffnesses that leave least.
 
     Args:
         states: that the rope was seen in.
@@ -106,37 +108,47 @@ def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatAr
     Damping time and mass over stiffness are those that leave least where states count by their ``share (S,)``.
     """
     pushes = np.concatenate([[1.0], -gravity])
-    shape, rates, carried = off[..., 0], off[..., 1], off[..., 2:].reshape(*off.shape[:2], 2, 4) @ pushes
-    made = np.concatenate([rates[..., None], -carried], axis=2)
+    shape, rates, torsion = off[..., 0], off[..., 1], off[..., 10]
+    carried = off[..., 2:10].reshape(*off.shape[:2], 2, 4) @ pushes
+    made = np.concatenate([rates[..., None], -carried, -torsion[..., None]], axis=2)
     root = np.sqrt(share)[:, None]
-    columns, wanted = (root[..., None] * made).reshape(-1, 3), -(root * shape).ravel()
-    sizes, kept = np.full(3, -1.0), np.ones(3, np.bool_)
+    columns, wanted = (root[..., None] * made).reshape(-1, 4), -(root * shape).ravel()
+    sizes, kept = np.full(4, -1.0), np.ones(4, np.bool_)
     while (sizes < 0.0).any():  # none of them can be negative
-        sizes = np.zeros(3)
+        sizes = np.zeros(4)
         sizes[kept] = np.linalg.lstsq(columns[:, kept], wanted, rcond=None)[0]
         kept &= sizes > 0.0
     return np.asarray(np.sum((shape + made @ sizes) ** 2, axis=1))
 
 
+def _parts(bend: KeptBend) -> tuple[FloatArray, ...]:
+    return bend.shape, bend.rates, bend.moments, bend.torsion
+
+
 def _columns(bend: KeptBend) -> FloatArray:
-    """All that it is made of ``(2 N, 10)``."""
-    return np.concatenate([x.reshape(-1, bend.shape.size) for x in (bend.shape, bend.rates, bend.moments)]).T
+    """All that it is made of ``(2 N, 11)``."""
+    return np.concatenate([x.reshape(-1, bend.shape.size) for x in _parts(bend)]).T
 
 
 def _from_columns(columns: FloatArray) -> KeptBend:
-    shape, rates, *moments = columns.T.reshape(10, -1, 2)
-    return KeptBend(shape, rates, np.reshape(moments, (2, 4, *shape.shape)))
+    shape, rates, *moments, torsion = columns.T.reshape(11, -1, 2)
+    return KeptBend(shape, rates, np.reshape(moments, (2, 4, *shape.shape)), torsion)
 
 
-def kept_in(scene: Scene, bending: RopeBending) -> StateBend:
+def kept_in(scene: Scene, bending: RopeBending, twist: FloatArray | None = None) -> StateBend:
     r"""What follows from the start of a scene, in the axes of ``bending``, which has been followed there.
 
-    At a free vertex mass times acceleration is the sum of weight, tension and the forces of the bending moments m,
-    three equations a vertex for two moments a vertex and one tension a segment. What the grippers give at both ends
-    remains open; of all moments that are in balance those are taken that leave the smallest natural curvature
+    At a free vertex mass times acceleration is the sum of weight, tension and the forces of twist and of the bending
+    moments m: three equations a vertex for two moments a vertex and one tension a segment. What the grippers give at
+    both ends remains open; of all moments that are in balance those are taken that leave the smallest natural curvature
     :math:`\kappa_0 = \kappa + \beta \dot\kappa - m / EI`, in the mean square along the rope; the damping time
     :math:`\beta` counts because a rope that is bending owes a part of its moments to that. A rope that does not start
     in motion is at rest.
+
+    Args:
+        scene: whose start it is.
+        bending: of its rope.
+        twist: rate at which the material is twisted at the inner vertices ``(N,)`` [rad/m]; None: it is not.
 
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
@@ -158,6 +170,8 @@ def kept_in(scene: Scene, bending: RopeBending) -> StateBend:
     pushes = np.stack([gained, *np.broadcast_to(np.eye(3)[:, None], (3, *start.shape))])
     masses = np.stack([scene.body.vertex_measures, scene.loads])
     needed = (masses[:, None, :, None] * pushes)[:, :, free].reshape(8, -1).T
+    twisting = still if twist is None else torsion_forces(start, twist)
+    needed = np.concatenate([needed, -twisting[free].reshape(-1, 1)], axis=1)
     left, sizes, right = np.linalg.svd(np.concatenate([by_moments, by_tension], axis=1))
     rank = int(np.sum(sizes > _RANK * sizes[0]))
     balanced = right[:rank].T @ ((left[:, :rank].T @ needed) / sizes[:rank, None])
@@ -168,3 +182,27 @@ def kept_in(scene: Scene, bending: RopeBending) -> StateBend:
     told = np.stack([bending.curvature.ravel(), bending.rates(moving).ravel(), *balanced[: 2 * places].T], axis=1)
     least = told - (ways @ (ways.T @ (weight * told))) / weight
     return StateBend(_from_columns(least), (ways / weight).reshape(places, 2, -1), bending.measures)
+
+
+def torsion_forces(vertices: FloatArray, torques: FloatArray) -> FloatArray:
+    r"""Nodal forces ``(V, 3)`` [N] of a twisted rope, of which the material frames do not turn.
+
+    Where a rope that is bent moves out of its plane, axes that are carried along it turn: by the gradients of the
+    holonomy of Bergou et al., *Discrete elastic rods*, 2008, :math:`\kappa b / 2 |e|`.
+
+    Args:
+        vertices: in order ``(V, 3)`` [m].
+        torques: about the rope at its inner vertices ``(V - 2,)`` [N m]; positive where the material turns to the left
+            as one goes along.
+    """
+    segments = np.diff(vertices, axis=0)
+    lengths = np.linalg.norm(segments, axis=1)
+    along = segments / lengths[:, None]
+    before, behind = along[:-1], along[1:]
+    bend = 2.0 * np.cross(before, behind) / (1.0 + np.sum(before * behind, axis=1))[:, None]
+    first, last = (torques[:, None] * bend / (2.0 * x[:, None]) for x in (lengths[:-1], lengths[1:]))
+    out = np.zeros_like(vertices)
+    out[:-2] += first
+    out[2:] -= last
+    out[1:-1] += last - first
+    return out

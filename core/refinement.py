@@ -55,6 +55,7 @@ def _halved(bend: KeptBend, body: Body, held: IntArray) -> KeptBend:
         free * interpolate(new, old, bend.shape),
         free * interpolate(new, old, bend.rates),
         free * np.moveaxis(moments, 0, 2),
+        free * interpolate(new, old, bend.torsion),
     )
 
 

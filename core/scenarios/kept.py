@@ -81,16 +81,21 @@ def _told(scenario: Scenario) -> StateBend:
     scene = scenario.scene(_ANY, np.zeros(3))
     bending = RopeBending(scene.body, scene.held)
     bending.follow(scene.start_positions)
-    frames = _frames(scenario, scene.start_positions)
-    return kept_in(scene, bending).turned(bending.axes, frames[1:-1])
+    vertices = scene.start_positions
+    plain, frames = _frames(scenario, vertices)
+    turned = np.sum(frames[:, :1] * plain, axis=2)  # the first axis of the material, in axes that are not twisted
+    angle = np.unwrap(np.arctan2(turned[:, 1], turned[:, 0]))
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(vertices, axis=0), axis=1))])
+    return kept_in(scene, bending, np.gradient(angle, along)[1:-1]).turned(bending.axes, frames[1:-1])
 
 
-def _frames(scenario: Scenario, vertices: FloatArray) -> FloatArray:
-    """Axes ``(V, 2, 3)`` of the cross-sections at the start, which go along from the first gripper.
+def _frames(scenario: Scenario, vertices: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Axes ``(V, 2, 3)`` of the cross-sections at the start, from the first gripper on: without twist, and as they are.
 
     They are twisted as the material is where markers beside the axis show that, and without twist where nothing does.
     """
     poses = scenario.motion.at(scenario.times[:1])[:, [0, -1]]
+    plain = np.asarray(untwisted_frames(vertices[None], poses)[0])
     if scenario.beside is None:
-        return np.asarray(untwisted_frames(vertices[None], poses)[0])
-    return np.asarray(rope_frames(vertices[None], poses, scenario.beside.turn, scenario.beside.natural)[0])
+        return plain, plain
+    return plain, np.asarray(rope_frames(vertices[None], poses, scenario.beside.turn, scenario.beside.natural)[0])

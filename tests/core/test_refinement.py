@@ -62,12 +62,13 @@ def test_a_bend_that_a_rope_keeps_is_the_same_on_the_finer_mesh() -> None:
     places = np.arange(1, 20)
     shape = np.stack([2.0 + np.sin(places / 5.0), 0.1 * places], axis=1)
     moments = np.random.default_rng(0).normal(size=(2, 4, 1, 2)) * np.linspace(0.0, 1.0, 19)[:, None]
-    coarse = replace(coarse, kept=KeptBend(shape, 0.1 * shape, moments))
+    coarse = replace(coarse, kept=KeptBend(shape, 0.1 * shape, moments, 0.2 * shape))
     fine = refined(coarse)
     assert fine is not None and fine.kept is not None
     assert [x.shape for x in (fine.kept.shape, fine.kept.moments)] == [(39, 2), (2, 4, 39, 2)]
     np.testing.assert_allclose(fine.kept.shape[3:-3:2], shape[1:-1])
     np.testing.assert_allclose(fine.kept.rates[3:-3:2], 0.1 * shape[1:-1])
+    np.testing.assert_allclose(fine.kept.torsion[3:-3:2], 0.2 * shape[1:-1])
     np.testing.assert_allclose(fine.kept.moments[..., 3:-3:2, :], moments[..., 1:-1, :])
     bends = [bent(s, s.kept.shape) for s in (coarse, fine) if s.kept is not None]
     np.testing.assert_allclose(bends[1].vertices[::2], bends[0].vertices, atol=5e-3)

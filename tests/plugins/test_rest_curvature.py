@@ -7,8 +7,11 @@ import pytest
 
 from muslin.backends.mujoco import MujocoSimulator
 from muslin.core.arrays import FloatArray
+from muslin.core.bending import RopeBending
+from muslin.core.beside import closing_angles
 from muslin.core.body import Body, rope_line
 from muslin.core.effect import Effect
+from muslin.core.kept_bend import kept_in
 from muslin.core.material import RopeMaterial
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
@@ -23,6 +26,7 @@ from muslin.plugins.effects.strands import RopeHysteresis
 
 MATERIAL = RopeMaterial(linear_density=0.05, stretch_stiffness=2000.0, bending_rigidity=2e-3, twist_rigidity=2e-3)
 TIME = np.arange(0.0, 1.2, 0.01)
+GRAVITY = np.array([0.0, 0.0, -9.80665])
 
 
 def reality(moved: float) -> Recording:
@@ -81,6 +85,27 @@ def test_a_straight_rope_with_it_moves_as_the_bent_one(moved: float, part: float
     assert off(1.0) < part * off(0.0)
 
 
+@pytest.mark.parametrize("turned", [4.0, -4.0])
+def test_what_twist_bends_is_no_bend_that_a_rope_keeps(turned: float) -> None:
+    """A straight rope that a gripper has twisted until it coils out of its plane, at rest."""
+    times = np.arange(0.0, 4.0, 0.02)
+    half = 0.5 * turned * np.minimum(times / 2.0, 1.0)
+    poses = np.tile([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.7, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]], (len(times), 1, 1))
+    poses[:, 1, 3], poses[:, 1, 4] = np.cos(half), np.sin(half)
+    scenario = replace(preset("cable").scenario((1.0,), (41,)), motion=Motion(times, poses), times=times)
+    material = replace(MATERIAL, bending_rigidity=4e-3, twist_rigidity=3e-3, damping_time=0.05)
+    vertices = rollout(MujocoSimulator(), scenario, material).vertices[[0, -1]]
+    before, after = closing_angles(vertices, poses[[0, -1]])
+    twist = after - before + 2 * np.pi * np.round((turned - after + before) / (2 * np.pi))
+    scene = replace(scenario.scene(material, GRAVITY), start=vertices[1])
+    bending = RopeBending(scene.body, scene.held)
+    bending.follow(vertices[1])
+    rates = np.full(39, twist / scene.body.measures[1:-1].sum())
+    told, untold = (kept_in(scene, bending, r).least.curvature(material, GRAVITY) for r in (rates, None))
+    assert np.std(untold) > 0.2 * np.std(bending.curvature)
+    assert np.std(told) < 0.2 * np.std(untold)
+
+
 @pytest.mark.parametrize("turned", [1.0, 2.0])
 def test_an_even_bend_shows_as_clamps_turn_a_rope_though_no_state_tells_it(turned: float) -> None:
     """Of an arc between two clamps: how much it turns in all is given by them, so its energy does not depend on it."""
@@ -101,7 +126,7 @@ def test_an_even_bend_shows_as_clamps_turn_a_rope_though_no_state_tells_it(turne
 
     told = model(still).kept
     assert told is not None
-    assert np.abs(told.curvature(material, np.array([0.0, 0.0, -9.81])).mean(axis=0)).max() < 0.05
+    assert np.abs(told.curvature(material, GRAVITY).mean(axis=0)).max() < 0.05
     assert abs(off(still, -2.0) - off(still, 0.0)) < 2e-4
     assert off(moving, -2.0) < 0.6 * min(off(moving, 0.0), off(moving, 2.0))
 
