@@ -12,10 +12,11 @@ from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.pose_span import uncovered
 from ..core.scenario import Scenario
-from ..core.scenarios.measured import MEASURED_NEAR
+from ..core.scenarios.measured import MEASURED_NEAR, MEASURED_PIECE
 from ..core.scenarios.standoffs import standing_off
 from ..core.study import Problem, build_problem, parse_config
 from ..core.study.objects import keep_points
+from ..core.study.windows import cut_all
 from .rope_start import may_start_measured, sags_aside, why_not_measured
 from .study_file import plan_table
 from .study_plan import Plan
@@ -127,6 +128,9 @@ def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
             f"the noise is {1e3 * noise:.2g} mm, which no model of a rope in motion comes near; the model is meant to "
             f"come within {1e3 * MEASURED_NEAR:g} mm ([noise] sd)"
         )
+        plan = replace(plan, window=_window(fitted))
+        if plan.window:
+            remarks.append(f"each take is fitted in pieces of {plan.window:g} s, and held-out ones stay whole")
     away = standing_off(fitted)
     if away:
         plan = replace(plan, markers="beside")
@@ -135,6 +139,17 @@ def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
             "bends"
         )
     return plan, remarks
+
+
+def _window(fitted: list[Recording]) -> float | None:
+    """Length of pieces to fit [s]; None where a take is not twice as long, or a piece would have too few frames."""
+    if min(float(np.ptp(r.series.time)) for r in fitted) < 2 * MEASURED_PIECE:
+        return None
+    try:
+        cut_all(fitted, MEASURED_PIECE)
+    except InputError:
+        return None
+    return MEASURED_PIECE
 
 
 def _on_nearest(plan: Plan, measured: Measurement, study: Path, count: int) -> tuple[Plan, list[str]]:

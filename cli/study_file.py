@@ -12,7 +12,7 @@ from ..core.material import UNITS
 from ..core.obstacles import Obstacle
 from ..core.registry import REGISTRY
 from ..core.scenarios import SIZES, preset
-from ..core.scenarios.measured import MEASURED_TAILS
+from ..core.scenarios.measured import MEASURED_PIECE, MEASURED_TAILS
 from ..core.study.config import DiagnoseTable, EstimatorTable
 from .study_plan import Plan
 
@@ -40,9 +40,12 @@ def study_text(plan: Plan) -> str:
 
 def _study(plan: Plan) -> str:
     pieces = ""
-    if plan.start:
+    if plan.window:
+        pieces = f"window = {plan.window:g}  # in pieces of so many seconds: after more, what whips is left to chance\n"
+    elif plan.start:
         pieces = (
-            "# window = 1.25  # in pieces of so many seconds that start as measured, if a fit finds the whole chaotic\n"
+            f"# window = {MEASURED_PIECE:g}  # in pieces of so many seconds that start as measured, if a fit finds the "
+            "whole chaotic\n"
         )
     return f"""
 [study]

@@ -29,6 +29,7 @@ class Plan:
         start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
         spacing: ``"measured"`` where the markers sit as far apart as they are seen, not where their vertices are.
         near: how near the model is meant to come [m], None for as near as the noise lets it.
+        window: length of the pieces that are fitted [s], None for whole recordings.
     """
 
     measurement: str
@@ -50,6 +51,7 @@ class Plan:
     start: str | None = None
     spacing: str | None = None
     near: float | None = None
+    window: float | None = None
 
     @property
     def priors(self) -> tuple[Parameter, ...]:

@@ -29,6 +29,8 @@ MEASURED_PRIORS = (
 MEASURED_NEAR = 0.005
 #: Frames that are further off than so many times that count by a logarithm only: what whips is left to chance.
 MEASURED_TAILS = 3.0
+#: Pieces in which takes of a rope in motion are fitted [s]; after more, one that whips is left to chance.
+MEASURED_PIECE = 1.0
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200

@@ -10,6 +10,7 @@ from ...core.differences import fourth_differences, robust_sd
 from ...core.errors import InputError
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
+from ...core.scenarios.measured import MEASURED_PIECE
 from ...core.scenarios.spacing import MATTERS, off_places
 from ...core.scenarios.standoffs import standing_off
 from ...core.series import PointSeries
@@ -22,8 +23,6 @@ from ..roughness import Roughness, roughness, unrepeatable
 STEP_MATTERS = 1.0
 #: A rope that is turned in its grippers by more than this is told of [rad].
 TURN_MATTERS = 0.2
-#: Recordings that are left to chance are to be fitted in pieces of this length [s], or halves if they are shorter.
-PIECE = 1.25
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -67,11 +66,14 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
 
 
 def _piece(problem: Problem) -> float | None:
-    """Length of pieces [s] that takes could be fitted in, as each would start as measured; None if they could not."""
+    """Length of pieces [s] that takes could be fitted in, as each would start as measured; None if they could not.
+
+    Shorter takes are halved.
+    """
     scenarios = [problem.scenarios[name] for name in problem.fit_on]
     if problem.pieces > 1.0 or any(s.start_motion is None for s in scenarios):
         return None
-    return min(PIECE, *(float(np.ptp(s.times)) / 2 for s in scenarios))
+    return min(MEASURED_PIECE, *(float(np.ptp(s.times)) / 2 for s in scenarios))
 
 
 def step_matters(

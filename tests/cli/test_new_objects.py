@@ -117,6 +117,23 @@ def test_markers_that_stand_beside_a_rope_are_said_to(tmp_path: Path, capsys: py
     build_problem(config, load_measurement(tmp_path / "m.zarr"), tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("noise", "lasts", "frames"), [(3e-5, 2.5, 200), (3e-5, 1.5, 200), (3e-5, 4.0, 30), (1e-3, 2.5, 200)]
+)
+def test_a_rope_that_is_seen_well_and_for_long_is_fitted_in_pieces(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, lasts: float, frames: int
+) -> None:
+    points, motion = from_end_to_end(9)
+    seen = points + np.random.default_rng(0).normal(0.0, noise, (frames, *points.shape))
+    take = Recording("one", PointSeries(np.linspace(0, lasts, frames), seen), motion)
+    save_measurement(Measurement((take, replace(take, name="two"))), tmp_path / "m.zarr")
+    path = tmp_path / "s.toml"
+    assert status("new", path, "--measurement", tmp_path / "m.zarr", "--scenario", "cable") == 0
+    pieces = noise < 1e-3 and lasts > 2.0 and frames > 100
+    assert read_config(path).study.window == (1.0 if pieces else None)
+    assert ("fitted in pieces of 1 s" in capsys.readouterr().out) == pieces
+
+
 @pytest.mark.parametrize("noise, near", [(3e-5, MEASURED_NEAR), (1e-3, None)])
 def test_a_rope_that_is_seen_far_better_than_it_is_modelled_is_held_to_less(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, near: float | None
