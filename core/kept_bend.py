@@ -78,7 +78,7 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
 
     States do not tell it equally well: where a rope whips, or markers went wrong, they are far from the others. So a
     state that is r off counts by :math:`1 / (r^2 + 3\, \text{median } r^2)`, much as under Student's distribution of
-    three degrees of freedom, by the damping time, mass over stiffness and ratio of stiffnesses that leave least.
+    three degrees of freedom, by the damping time, mass and twisting over bending stiffness that leave least.
 
     Args:
         states: that the rope was seen in.
@@ -103,9 +103,10 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
 
 
 def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatArray:
-    """By how much states are off ``(S,)``, of what they are off by in all that a bend is made of ``(S, N, 10)``.
+    """By how much states are off ``(S,)``, of what they are off by in all that a bend is made of ``(S, N, 11)``.
 
-    Damping time and mass over stiffness are those that leave least where states count by their ``share (S,)``.
+    Damping time, mass and twisting over bending stiffness are those that leave least where states count by their
+    ``share (S,)``.
     """
     pushes = np.concatenate([[1.0], -gravity])
     shape, rates, torsion = off[..., 0], off[..., 1], off[..., 10]

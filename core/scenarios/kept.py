@@ -80,8 +80,8 @@ def _told(scenario: Scenario) -> StateBend:
     """From the start of one; by unit of mass and gravity, so neither the material nor gravity counts."""
     scene = scenario.scene(_ANY, np.zeros(3))
     bending = RopeBending(scene.body, scene.held)
-    bending.follow(scene.start_positions)
     vertices = scene.start_positions
+    bending.follow(vertices)
     plain, frames = _frames(scenario, vertices)
     turned = np.sum(frames[:, :1] * plain, axis=2)  # the first axis of the material, in axes that are not twisted
     angle = np.unwrap(np.arctan2(turned[:, 1], turned[:, 0]))
