@@ -23,8 +23,9 @@ class RestCurvature(Effect):
     where nothing acts on it: 1 is in balance in the mean.
 
     What hardly any state tells is a bend that is even along a rope between two clamps, as that of a spool on which it
-    was stored: the clamps hold it straight, and their moments, which nobody measures, are much the same in all states.
-    How it moves does tell. So that part has coefficients of its own, which come on top.
+    was stored: the clamps give how much the rope turns in all, so as long as it stays in one plane such a bend changes
+    neither its shape nor its energy. How it moves out of that plane does tell. So that part has coefficients of its
+    own, which come on top.
 
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
