@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray, cross
+from .arrays import FloatArray, IntArray, cross, dot
 from .body import Body
 from .clamps import clamped_segments
 
@@ -147,18 +147,18 @@ class RopeBending(Bending):
 
     def follow(self, positions: FloatArray) -> None:
         apart = positions[1:] - positions[:-1]
-        self._over_length = 1.0 / np.linalg.norm(apart, axis=1)[:, None]
+        self._over_length = 1.0 / np.sqrt(dot(apart, apart))[:, None]
         self._along = apart * self._over_length
         before, behind = self._along[:-1], self._along[1:]
         tangent = _unit(before + behind)
         old = self._tangent
-        turned = np.sum(self._first * tangent, axis=1) / np.maximum(1.0 + np.sum(old * tangent, axis=1), 1e-9)
+        turned = dot(self._first, tangent) / np.maximum(1.0 + dot(old, tangent), 1e-9)
         first = self._first - turned[:, None] * (old + tangent)
-        self._first = _unit(first - np.sum(first * tangent, axis=1)[:, None] * tangent)
+        self._first = _unit(first - dot(first, tangent)[:, None] * tangent)
         self._tangent, self._second = tangent, cross(tangent, self._first)
         across = cross(before, behind)
-        sine = np.linalg.norm(across, axis=1)[:, None]
-        angle = np.arctan2(sine, np.sum(before * behind, axis=1)[:, None])
+        sine = np.sqrt(dot(across, across))[:, None]
+        angle = np.arctan2(sine, dot(before, behind)[:, None])
         # The turning plane turns about the tangent at the rate that the segments turn times this.
         self._ratio = np.where(sine > 1e-9, angle / np.maximum(sine, 0.1 * angle + 1e-300), 1.0)
         self._axis = across / np.maximum(sine, 1e-300)
@@ -184,16 +184,18 @@ class RopeBending(Bending):
         return np.stack([self._first, self._second], axis=1)
 
     def _in_frame(self, vectors: FloatArray) -> FloatArray:
-        return np.stack([np.sum(vectors * self._first, axis=1), np.sum(vectors * self._second, axis=1)], axis=1)
+        out = np.empty((len(vectors), 2))
+        out[:, 0], out[:, 1] = dot(vectors, self._first), dot(vectors, self._second)
+        return out
 
     def _answer(self, vectors: FloatArray) -> FloatArray:
         """Relative spin of the segments to the rate of the turning vector; its own transpose."""
-        about = np.sum(vectors * self._axis, axis=1)[:, None] * self._axis
+        about = dot(vectors, self._axis)[:, None] * self._axis
         return np.asarray(self._ratio * vectors + (1.0 - self._ratio) * about)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+    return np.asarray(vectors / np.maximum(np.sqrt(dot(vectors, vectors)), 1e-300)[:, None])
 
 
 def _hinges(triangles: IntArray) -> IntArray:
