@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
 from ..core.differences import fourth_differences, robust_sd
@@ -78,20 +79,39 @@ def _own(residual: FloatArray, rng: np.random.Generator) -> _Own | None:
     for shared in range(len(s) // 2):
         off = (u[:, :shared], vt[:shared])
         left = (u[:, shared:] * s[shared:]) @ vt[shared:]
-        lags = [np.mean([_lag(_noise(x.shape, a, off, rng)) for _ in range(2)]) for a in _GRID]
+        lags = [_expected(off[0], a)[1] for a in _GRID]
         if _lag(left) > lags[-1]:
             continue  # too slow for noise
         ar1 = float(np.interp(_lag(left), lags, _GRID))
-        replicates = [_noise(x.shape, ar1, off, rng) for _ in range(_REPLICATES)]
         total = float(np.sum(left**2))
-        sd = float(np.sqrt(total / np.mean([np.sum(e**2) for e in replicates])))
-        if enough is None:
-            leading = [np.linalg.norm(e, 2) ** 2 / np.sum(e**2) for e in replicates]
-            agrees = abs(sd * _roughness_of(ar1) / rough - 1) < _AGREE
-            enough = shared if agrees and s[shared] ** 2 / total <= np.quantile(leading, _QUANTILE) else None
+        sd = float(np.sqrt(total / (_expected(off[0], ar1)[0] * (x.shape[1] - shared))))
+        if enough is None and abs(sd * _roughness_of(ar1) / rough - 1) < _AGREE:
+            leading = [_leading(_noise(x.shape, ar1, off, rng)) for _ in range(_REPLICATES)]
+            enough = shared if s[shared] ** 2 / total <= np.quantile(leading, _QUANTILE) else None
         if enough is not None and shared >= enough + _MORE:
             return _Own(sd, ar1, int(np.isfinite(residual).sum()))
     return None
+
+
+def _expected(off: FloatArray, ar1: float) -> tuple[float, float]:
+    """Of a column of AR(1) noise of unit variance without the directions ``off (T, K)``: mean square sum, and lag.
+
+    With R the noise's correlations and P what takes the directions off, these are the trace of P R P and the sum beside
+    its diagonal over that. R times a direction is what the noise's filter makes of it forwards and backwards.
+    """
+    ahead, back = (lfilter([1.0], [1.0, -ar1], d, axis=0) for d in (off, off[::-1]))
+    seen = ahead + back[::-1] - off
+    inner = off @ (off.T @ seen)
+    squares = 1.0 + np.sum(off * (inner - 2.0 * seen), axis=1)
+    beside = ar1 + np.sum(off[:-1] * (inner - seen)[1:] - seen[:-1] * off[1:], axis=1)
+    lag = np.sum(beside) / np.sqrt(np.sum(squares[1:]) * np.sum(squares[:-1]))
+    return float(np.sum(squares)), float(lag)
+
+
+def _leading(x: FloatArray) -> float:
+    """The share of the square sum of ``x (T, C)`` that its leading singular direction has."""
+    products = x @ x.T if x.shape[0] < x.shape[1] else x.T @ x
+    return float(np.linalg.eigvalsh(products)[-1] / np.trace(products))
 
 
 def _filled(residual: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import pytest
 from muslin.core.arrays import FloatArray
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
-from muslin.inference.correlated_noise import correlated_noise
+from muslin.inference.correlated_noise import _expected, correlated_noise
 from muslin.inference.noise import Noise, _from_repeats
 
 #: As roughness tells noise of 3 mm with a correlation of 0.8.
@@ -62,6 +62,19 @@ def test_what_a_person_says_keeps_its_size() -> None:
     found = correlated_noise(told, [ar1_noise(0.003, 0.8, 0)])
     assert found.sd == told.sd and found.ar1 == pytest.approx(0.8, abs=0.1)
     assert correlated_noise(told, [ar1_noise(0.006, 0.8, 0)]) is told  # a misfit of a kind, not this noise
+
+
+@pytest.mark.parametrize("ar1", [0.0, 0.6, 0.95])
+@pytest.mark.parametrize("shared", [0, 1, 7])
+def test_what_is_expected_of_noise_is_what_its_correlations_say(ar1: float, shared: int) -> None:
+    """Against the matrix of all correlations, with the directions taken off on both sides."""
+    off = np.linalg.qr(np.random.default_rng(3).normal(size=(25, shared)))[0]
+    frames = np.arange(25)
+    keep = np.eye(25) - off @ off.T
+    left = keep @ ar1 ** np.abs(frames[:, None] - frames) @ keep
+    own, squares = np.diag(left), np.trace(left)
+    lag = np.diag(left, 1).sum() / np.sqrt(own[1:].sum() * own[:-1].sum())
+    np.testing.assert_allclose(_expected(off, ar1), [squares, lag], rtol=1e-9, atol=1e-12)
 
 
 def test_too_few_numbers_tell_nothing() -> None:
