@@ -18,6 +18,10 @@ from ...core.arrays import FloatArray
 
 #: How far the first of many steps that look back is thrown, where they look back as far as is useful.
 FIRST_OVERSHOOT = 0.7
+#: Changes of the velocities that go to and fro from step to step: their correlation, the largest of them that nobody
+#: sees [m a step], in how many steps on end they shake an object, and what is left then of looking back, if not so
+#: little that it is of no use.
+TO_AND_FRO, UNSEEN, ON_END, LEFT, OF_NO_USE = -0.3, 1e-4, 4, 0.25, 0.01
 
 
 class Gliding(ABC):
@@ -93,23 +97,33 @@ class TwoStep(Gliding):
     second. What is too fast for the step it damps as Euler does, which is a = 0. Forces that MuJoCo does not know are
     those where the step begins, which would be a step late: 2 f_n - f_(n-1) goes on to its end.
 
+    How far a rope can look back hangs on how it lies: where what MuJoCo's implicit matrix leaves out is stiff or damped
+    enough, the rope shakes, its velocities going to and fro from step to step. It then looks back less from there on.
+
     Args:
         time_step: h [s].
-        looking_back: a, at most 1/3.
+        looking_back: a at first, at most 1/3.
         count: N.
     """
 
     def __init__(self, time_step: float, looking_back: float, count: int) -> None:
         self._first = Thrown(time_step, FIRST_OVERSHOOT * 3.0 * looking_back, count)
-        self._looking_back = looking_back
-        self._step = (1.0 - looking_back) * time_step
-        self._own_damping = time_step * (1.0 - 3.0 * looking_back) / (1.0 - looking_back)
+        self._time_step = time_step
         self._x, self._v, self._change, self._forces = (np.empty(count) for _ in range(4))
         self._ahead, self._nothing = np.empty(count), np.zeros(count)
+        self._gain, self._last_gain, self._shaken = np.zeros(count), np.zeros(count), 0
+        self._look_back(looking_back)
         self.forget()
+
+    def _look_back(self, looking_back: float) -> None:
+        self._looking_back = looking_back
+        self._step = (1.0 - looking_back) * self._time_step
+        self._own_damping = self._time_step * (1.0 - 3.0 * looking_back) / (1.0 - looking_back)
 
     def forget(self) -> None:
         self._started = self._pushed = False
+        self._last_gain[:] = self._gain[:] = 0.0
+        self._shaken = 0
         self.step, self.way, self.own_damping = self._first.step, self._first.way, self._first.own_damping
 
     def begin(self, x: FloatArray, v: FloatArray) -> None:
@@ -137,5 +151,21 @@ class TwoStep(Gliding):
         if not self._started:
             self._first.end(x, v)
             self._started = True
-            self.step = self.way = self._step
-            self.own_damping = self._own_damping
+        elif self._looking_back > 0.0:
+            self._calm(v)
+        self.step = self.way = self._step
+        self.own_damping = self._own_damping
+
+    def _calm(self, v: FloatArray) -> None:
+        """Look back less if the velocities ``v (N,)`` go to and fro."""
+        self._gain, self._last_gain = self._last_gain, self._gain
+        np.subtract(v, self._v, out=self._gain)
+        along, size = self._gain @ self._last_gain, self._gain @ self._gain + self._last_gain @ self._last_gain
+        if 2.0 * along > TO_AND_FRO * size or np.abs(self._gain).max() * self._time_step < UNSEEN:
+            self._shaken = 0
+            return
+        self._shaken += 1
+        if self._shaken == ON_END:
+            left = LEFT * self._looking_back
+            self._look_back(left if left > OF_NO_USE else 0.0)
+            self._shaken = 0
