@@ -40,7 +40,7 @@ class MujocoSimulator(Simulator):
             "contact-forces",
         }
     )
-    #: A rope that swings is 13.6 mm from itself at 0.5 ms if steps take 5 ms, 0.9 mm if this (`make bench-sim`).
+    #: A rope that swings is 16.1 mm from itself at 0.5 ms if steps take 5 ms, 0.8 mm if this (`make bench-sim`).
     usual_steps: ClassVar[Mapping[str, float]] = MappingProxyType({"rope": 0.00125})
 
     def __init__(self, time_step: float = 0.005) -> None:
