@@ -15,10 +15,10 @@ _NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """As ``np.cross`` of ``(N, 3)``, at a sixth to a third of its price for some dozens to hundreds of vectors."""
+    """As ``np.cross`` of ``(N, 3)``, in less time for dozens to hundreds of vectors, where calls are what costs."""
     return np.asarray(a.take(_NEXT, 1) * b.take(_AFTER, 1) - a.take(_AFTER, 1) * b.take(_NEXT, 1))
 
 
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Products ``(N,)`` of vectors ``(N, 3)``, faster than their sum for some dozens."""
+    """Products ``(N,)`` of vectors ``(N, 3)`` and ``(N, 3)``, in one call."""
     return np.asarray(np.einsum("nx,nx->n", a, b))

@@ -214,14 +214,14 @@ def _fold(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     start, end, left, right = corners
     edge, to_left, to_right = end - start, left - start, right - start
     up, down = cross(edge, to_left), cross(to_right, edge)
-    length2 = np.einsum("hx,hx->h", edge, edge)
+    length2 = dot(edge, edge)
     length = np.sqrt(length2)
-    angle = np.arctan2(-np.einsum("hx,hx->h", up, to_right) * length, np.einsum("hx,hx->h", up, down))
+    angle = np.arctan2(-dot(up, to_right) * length, dot(up, down))
     out = np.empty_like(corners)
-    out[2] = up * (-length / np.maximum(np.einsum("hx,hx->h", up, up), 1e-300))[:, None]
-    out[3] = down * (-length / np.maximum(np.einsum("hx,hx->h", down, down), 1e-300))[:, None]
-    at_left = (np.einsum("hx,hx->h", edge, to_left) / length2)[:, None]
-    at_right = (np.einsum("hx,hx->h", edge, to_right) / length2)[:, None]
+    out[2] = up * (-length / np.maximum(dot(up, up), 1e-300))[:, None]
+    out[3] = down * (-length / np.maximum(dot(down, down), 1e-300))[:, None]
+    at_left = (dot(edge, to_left) / length2)[:, None]
+    at_right = (dot(edge, to_right) / length2)[:, None]
     out[1] = -at_left * out[2] - at_right * out[3]
     out[0] = -out[1] - out[2] - out[3]
     return angle, out

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray, IntArray, dot
 from ...core.bending import bending_of
 from ...core.material import ClothMaterial, RopeMaterial
 from ...core.scene import Scene
@@ -87,13 +87,9 @@ class GripLoad:
         turned = np.stack([moves[:, 1] - moves[:, 0], moves[:, 2] - moves[:, 0]], axis=2)
         shape = edges @ self._inverse
         (x, y), (dx, dy) = shape.transpose(2, 0, 1), np.einsum("exim,eij->jexm", turned, self._inverse)
-        strain = 0.5 * np.stack([_dot(x, x) - 1.0, _dot(y, y) - 1.0, 2.0 * _dot(x, y)], axis=1)
+        strain = 0.5 * np.stack([dot(x, x) - 1.0, dot(y, y) - 1.0, 2.0 * dot(x, y)], axis=1)
         rates = [np.einsum("ex,exm->em", a, b) for a, b in ((x, dx), (y, dy), (x, dy), (y, dx))]
         return strain, np.stack([rates[0], rates[1], rates[2] + rates[3]], axis=1)
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("ex,ex->e", a, b))
 
 
 def _motions(arms: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.arrays import FloatArray, dot
 from ...core.body import Body
 from ...core.effect import Effect, StiffnessFactor
 from ...core.material import ClothMaterial, Material
@@ -101,7 +101,7 @@ class SheetStrain:
     def __call__(self, positions: FloatArray) -> FloatArray:
         a, b, c = positions[self._triangles]
         u, v = b - a, c - a
-        uu, vv, uv = (np.einsum("ex,ex->e", p, q) for p, q in ((u, u), (v, v), (u, v)))
+        uu, vv, uv = (dot(p, q) for p, q in ((u, u), (v, v), (u, v)))
         p, q, r, s = self._inverse.reshape(-1, 4).T
         xx = p * p * uu + 2 * p * r * uv + r * r * vv  # right Cauchy-Green tensor in the plane of the rest shape
         yy = q * q * uu + 2 * q * s * uv + s * s * vv
@@ -120,5 +120,5 @@ def rest_shape(corners: FloatArray, along: FloatArray | None = None) -> FloatArr
     x = u / np.linalg.norm(u, axis=1, keepdims=True) if along is None else along
     normal = np.cross(u, v)
     y = np.cross(normal / np.linalg.norm(normal, axis=1, keepdims=True), x)
-    rows = [[np.einsum("ex,ex->e", e, axis) for e in (u, v)] for axis in (x, y)]
+    rows = [[dot(e, axis) for e in (u, v)] for axis in (x, y)]
     return np.linalg.inv(np.array(rows).transpose(2, 0, 1))

@@ -18,8 +18,7 @@ from .views import two_views
 _FEATURES, _REPLICATES, _LEVEL = 256, 200, 0.05
 #: Numbers that are embedded at a time: what stays in a processor's cache, which takes less than half the time.
 _CHUNK = 1_000_000
-#: Replicates of noise that is larger than this part of the bandwidth are embedded in single precision, which takes a
-#: quarter of the time.
+#: Replicates of noise that is larger than this part of the bandwidth are embedded in single precision, which shows it.
 _SEEN_SINGLE = 1e-4
 #: Points of a frame that are compared, at most, and frames whose distances the bandwidth is the median of.
 _MOST_POINTS, _MEDIAN_FRAMES = 200, 12
