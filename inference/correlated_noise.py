@@ -14,7 +14,8 @@ from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
 from ..core.differences import fourth_differences, robust_sd
-from .noise import Noise, ar1_noise
+from .noise import Noise
+from .noise_draws import ar1_noise
 
 #: Below this correlation from frame to frame noise is taken for white, which roughness tells better.
 WHITE = 0.4

@@ -4,7 +4,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
 
 from ..core.arrays import FloatArray
 from ..core.differences import fourth_differences, robust_sd
@@ -12,6 +11,7 @@ from ..core.errors import InputError
 from ..core.interpolation import interpolate
 from ..core.measurement import Recording, repeats
 from ..core.study import Problem
+from .noise_draws import ar1_noise, smooth_noise
 
 #: Largest clock offset between repeats that is looked for, this [s] or so many frames if they are longer.
 _LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
@@ -19,11 +19,21 @@ _LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
 _SLOWEST = 0.98
 
 
-def ar1_noise(shape: tuple[int, ...], ar1: float, rng: np.random.Generator) -> FloatArray:
-    """AR(1) noise of unit variance along the first axis, ``ar1`` from frame to frame."""
-    wild = rng.normal(size=shape)
-    wild[1:] *= np.sqrt(1 - ar1**2)
-    return np.asarray(lfilter([1.0], [1.0, -ar1], wild, axis=0), float)
+@dataclass(frozen=True)
+class SharedNoise:
+    """The part of the noise that points near each other have in common, as depth cameras that do not agree make it.
+
+    Args:
+        share: of the variance; by the rest every point is off by itself.
+        reach: two points at the distance d are correlated by exp(-d^2 / (2 reach^2)) [unit].
+        ar1: correlation between successive frames of what stays in one place.
+        together: how many numbers of the measurement are worth an independent one.
+    """
+
+    share: float
+    reach: float
+    ar1: float
+    together: float
 
 
 @dataclass(frozen=True)
@@ -37,6 +47,7 @@ class Noise:
         unit: "m" or "px".
         relative_error: of ``sd``, one standard deviation.
         tails: a fit counts frames that are off by much more than so many ``sd`` by a logarithm only; None: by squares.
+        shared: what neighbours have in common; None if each is off by itself.
     """
 
     sd: float
@@ -45,10 +56,19 @@ class Noise:
     unit: str
     relative_error: float
     tails: float | None = None
+    shared: SharedNoise | None = None
+
+    @classmethod
+    def from_dict(cls, kept: dict[str, Any]) -> "Noise":
+        """The one that :meth:`as_dict` gave."""
+        shared = kept.get("shared")
+        return cls(**{**kept, "shared": SharedNoise(**shared) if shared else None})
 
     @property
     def information(self) -> float:
-        """How many independent numbers one number of an AR(1) sequence is worth, for its mean."""
+        """How many independent numbers one number is worth, for what many have in common."""
+        if self.shared is not None:
+            return 1.0 / self.shared.together
         return (1 - self.ar1) / (1 + self.ar1)
 
     @property
@@ -58,6 +78,14 @@ class Noise:
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+    def draw(self, places: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Noise of what is at ``places (T, P, A)``, in units of ``sd``."""
+        if self.shared is None:
+            return ar1_noise(places.shape, self.ar1, rng)
+        own = np.sqrt(1.0 - self.shared.share) * rng.normal(size=places.shape)
+        field = smooth_noise(places, self.shared.reach, self.shared.ar1, rng)
+        return np.asarray(own + np.sqrt(self.shared.share) * field)
 
 
 def estimate_noise(problem: Problem, told: float | None, tails: float | None = None) -> Noise:

@@ -1,7 +1,7 @@
 """Measured minus predicted, in units of the noise, with clock and constant offsets taken out."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -37,11 +37,13 @@ class Residual:
         white: the same in units of the noise ``(N,)``, see :func:`_weighted`, and one number for each
             offset under its prior; its sum of squares is minus twice the log posterior.
         clock: offset of the measurement's clock that was taken out [s].
+        constant: offset of all points that was taken out ``(A,)`` [unit], or ``(1,)`` zero.
     """
 
     difference: FloatArray
     white: FloatArray
     clock: float = 0.0
+    constant: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @property
     def rms(self) -> float:
@@ -75,7 +77,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
     measured, time = recording.series.points, recording.series.time
     paired = recording.series.correspondence
     if offsets.clock == 0.0 and offsets.constant == 0.0:
-        difference = measured - (predicted.points if paired else _nearest(measured, predicted.points)[0])
+        difference = measured - (predicted.points if paired else nearest(measured, predicted.points)[0])
         return Residual(difference, _weighted(difference, noise))
     clock, constant = 0.0, np.zeros(measured.shape[2])
     least, best = np.inf, (clock, constant, measured)
@@ -83,7 +85,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         shifted = interpolate(time + clock, time, predicted.points)
         slope = np.gradient(shifted, time, axis=0)
         if not paired:
-            shifted, slope = _nearest(measured - constant, shifted, slope)
+            shifted, slope = nearest(measured - constant, shifted, slope)
         difference = measured - shifted - constant
         cost = _cost(difference, clock, constant, noise, offsets)
         if cost < least:
@@ -98,7 +100,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         parts.append(np.array([clock / offsets.clock]))
     if offsets.constant > 0:
         parts.append(constant / offsets.constant)
-    return Residual(difference, np.concatenate(parts), clock)
+    return Residual(difference, np.concatenate(parts), clock, constant)
 
 
 def rms_apart(pairs: Iterable[tuple[FloatArray, FloatArray]]) -> float:
@@ -160,7 +162,7 @@ def _solve(right: FloatArray, design: FloatArray, clock: float, noise: Noise, of
     return np.asarray(np.linalg.solve(weight * design.T @ design + np.diag(prior), pull))
 
 
-def _nearest(measured: FloatArray, model: FloatArray, *more: FloatArray) -> list[FloatArray]:
+def nearest(measured: FloatArray, model: FloatArray, *more: FloatArray) -> list[FloatArray]:
     """Of ``model (T, Q, A)`` the point nearest to each of ``measured (T, P, A)``, and what ``more`` says of it.
 
     Returns:

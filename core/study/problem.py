@@ -108,6 +108,11 @@ class Problem:
         scenario, measured = self.scenarios[recording], self.recordings[recording].series.points.shape[1]
         return self.extractor.points_of(len(scenario.body.vertices), len(scenario.markers), measured)
 
+    @property
+    def clouds(self) -> list[str]:
+        """Recordings whose points are places anywhere on the object, of which any part may be hidden or cut off."""
+        return [n for n, r in self.recordings.items() if self.scenarios[n].sampled and not r.series.correspondence]
+
     def played_as(self) -> dict[str, str]:
         """For every recording the first one with the same rollouts: itself, or an earlier take of its motion."""
         out: dict[str, str] = {}

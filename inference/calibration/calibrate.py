@@ -64,7 +64,7 @@ def calibrate(study: Study, simulations: int = 0, predictive: int = PREDICTIVE) 
             f"{problem.simulator.engine_version()}; run: muslin fit {study.path}"
         )
     recordings = [problem.recordings[r] for r in problem.fit_on]
-    takes = Takes(Observer(recordings, fit.noise, offsets_of(study)), problem.scenarios)
+    takes = Takes(Observer(recordings, fit.noise, offsets_of(study), problem.clouds), problem.scenarios)
     store = DrawStore(study, problem, takes.simulated, table.rounds * table.draws)
     theta, points, numbers = store.read(fit.rounds * table.draws)
     weights = read(group, "log_weights") if "log_weights" in group else None
@@ -153,5 +153,6 @@ def _predictive(
             study.progress(f"{name}: only {len(predicted)} of {count} posterior draws can be simulated", 0, 0)
             continue
         role = "fit" if name in problem.fit_on else "held-out"
-        checks.append(predictive_check(problem.recordings[name], role, predicted, fit.noise, offsets_of(study), rng))
+        recording, offsets, partly = problem.recordings[name], offsets_of(study), name in problem.clouds
+        checks.append(predictive_check(recording, role, predicted, fit.noise, offsets, rng, partly))
     return checks

@@ -66,6 +66,7 @@ def predictive_check(
     noise: Noise,
     offsets: Offsets,
     rng: np.random.Generator,
+    partly: bool = False,
 ) -> tuple[Predictive, FloatArray]:
     """Hold a measurement against predictions of posterior draws.
 
@@ -81,21 +82,20 @@ def predictive_check(
         predictions: clean points ``(T, P, A)`` of posterior draws, at least three.
         noise, offsets: of the measurement.
         rng: of the replicates.
+        partly: the recording is a cloud that shows a part of the object, see :class:`~..observe.Observer`.
 
     Returns:
         The finding, and the discrepancies of the replicates ``(R,)``.
     """
     clean = np.stack(predictions)
     spread = np.sqrt(clean.var(axis=0, ddof=1) * (1 + 1 / len(clean)) + noise.sd**2)
-    total, observer = clean.sum(axis=0), Observer([recording], noise, offsets)
+    total, observer = clean.sum(axis=0), Observer([recording], noise, offsets, [recording.name] if partly else ())
     copies = np.repeat(clean, -(-REPLICATES // len(clean)), axis=0)
-    numbers = np.arange(len(copies))
-    seen = observer.observe([copies], numbers, int(rng.integers(2**31)))[0]
+    numbers, start = np.arange(len(copies)), int(rng.integers(2**31))
     # the noise may be larger or smaller than it is taken for, by the error of its estimate
-    wrong = 1.0 + noise.relative_error * rng.standard_normal(len(copies))
+    strengths = 1.0 + noise.relative_error * rng.standard_normal(len(copies))
     replicates = []
-    for k, points in enumerate(seen):
-        flawed = copies[k] + (points - copies[k]) * wrong[k]
+    for k, flawed in enumerate(observer.observe([copies], numbers, start, strengths)[0]):
         others = (total - copies[k]) / (len(clean) - 1)
         replicates.append(_discrepancy(recording, flawed, others, spread, noise, offsets))
     measured = _discrepancy(recording, recording.series.points, total / len(clean), spread, noise, offsets)

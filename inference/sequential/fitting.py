@@ -6,11 +6,13 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.errors import MuslinError
+from ...core.interpolation import interpolate
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.series import PointSeries
 from ...core.store import storage_errors
 from ...core.study import SimulationPool, Study, Task
+from ..cloud_noise import Cloud, cloud_noise
 from ..correlated_noise import correlated_noise
 from ..discrepancy import NONE, Discrepancy
 from ..noise import Noise, estimate_noise
@@ -73,9 +75,9 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
         study.progress("polishing the best draw by least squares", 0, 0)
         before = pool.count
         best, step, found = _polished(study, pool, store, noise, takes, upto)
-        truer = correlated_noise(noise, _residuals(study, pool, best, noise))
+        truer = _truer(study, pool, best, noise)
         if truer is not noise:
-            study.progress("learning again: the noise is correlated in time", 0, 0)
+            study.progress(f"learning again: the noise is not what it was taken for ({truer.source})", 0, 0)
             noise, takes = truer, _takes(study, truer)
             learner = Learner(study, takes)
             posterior = learner.learn(theta, points, numbers, proposals, k)
@@ -108,20 +110,27 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
 def _takes(study: Study, noise: Noise) -> Takes:
     problem = study.problem
     recordings = [problem.recordings[r] for r in problem.fit_on]
-    return Takes(Observer(recordings, noise, offsets_of(study)), problem.scenarios)
+    return Takes(Observer(recordings, noise, offsets_of(study), problem.clouds), problem.scenarios)
 
 
-def _residuals(study: Study, pool: SimulationPool, best: Polished, noise: Noise) -> list[FloatArray]:
-    """Measured minus predicted ``(T, P, A)`` of every fitted recording with correspondence that can be simulated."""
-    problem = study.problem
+def _truer(study: Study, pool: SimulationPool, best: Polished, noise: Noise) -> Noise:
+    """The noise as the best fit shows it: slow, or shared by neighbours; ``noise`` itself if it is neither."""
+    problem, offsets = study.problem, offsets_of(study)
     values = problem.space.as_dict(problem.space.from_unit(best.unit))
-    recordings = [problem.recordings[n] for n in problem.fit_on if problem.recordings[n].series.correspondence]
-    outcomes = pool.map([Task(values, r.name) for r in recordings])
-    return [
-        residual(r, o.series, noise, offsets_of(study)).difference
-        for r, o in zip(recordings, outcomes, strict=True)
-        if isinstance(o, Trajectory)
-    ]
+    differences, clouds = [], []
+    outcomes = pool.map([Task(values, name) for name in problem.fit_on])
+    for recording, outcome in zip((problem.recordings[n] for n in problem.fit_on), outcomes, strict=True):
+        if not isinstance(outcome, Trajectory):
+            continue
+        found, time = residual(recording, outcome.series, noise, offsets), recording.series.time
+        if recording.series.correspondence:
+            differences.append(found.difference)
+        elif recording.name in problem.clouds:
+            model = interpolate(time + found.clock, time, outcome.series.points)
+            clouds.append(Cloud(recording.series.points - found.constant, model))
+    if differences or not clouds:
+        return correlated_noise(noise, differences)
+    return cloud_noise(noise, clouds)
 
 
 def _polished(

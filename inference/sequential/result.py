@@ -168,7 +168,7 @@ def load_fit(study: Study) -> FitResult:
             estimate=read(group, "estimate"),
             sd=read(group, "estimate_sd"),
             samples=read(group, "posterior_samples"),
-            noise=Noise(**a["noise"]),
+            noise=Noise.from_dict(a["noise"]),
             at_bound=tuple(a["at_bound"]),
             warnings=tuple(a["warnings"]),
             rounds=int(a["rounds"]),

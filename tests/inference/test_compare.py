@@ -139,7 +139,7 @@ def test_a_model_without_any_error_shows_no_sign_of_a_misfit() -> None:
 
 def test_replicated_noise_has_the_strength_and_the_colour_of_its_estimate() -> None:
     rng = np.random.default_rng(1)
-    made = NoiseDraws(Noise(SD, 0.6, "told", "m", 0.0), 300, rng).of((40, 5, 3), rng)
+    made = NoiseDraws(Noise(SD, 0.6, "told", "m", 0.0), 300, rng).at(np.zeros((40, 5, 3)), rng)
     assert abs(made.std() - 1.0) < 0.02
     assert abs(np.mean(made[:, 1:] * made[:, :-1]) - 0.6) < 0.02
     unsure = NoiseDraws(Noise(SD, 0.0, "told", "m", 0.2), 4000, rng)

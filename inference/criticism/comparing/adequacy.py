@@ -130,7 +130,7 @@ def _rows(
     """White residuals of replicates before their refit ``(R, N)``; each has offsets of its own, from the prior."""
     parts = []
     for held in takes:
-        under = held.under_noise(draws.of(held.seen.shape, rng, which) * noise.sd)
+        under = held.under_noise(draws.at(held.origin, rng, which) * noise.sd)
         weight = np.sqrt(noise.information) / noise.sd
         parts.append(under[:, held.seen] * weight)
         extra = len(held.residual.white) - parts[-1].shape[1]

@@ -92,7 +92,7 @@ def _expected(held: Held, noise: Noise, rng: np.random.Generator) -> float:
     """Mean square of a number under noise alone [unit2]."""
     if held.paired:
         return noise.sd**2
-    draws = NoiseDraws(noise, _REPLICATES, rng).of(held.residual.difference.shape, rng) * noise.sd
+    draws = NoiseDraws(noise, _REPLICATES, rng).at(held.origin, rng) * noise.sd
     under = held.under_noise(draws)[:, held.seen]
     return float(np.mean(under**2))
 

@@ -11,7 +11,7 @@ _NEGLIGIBLE = 1e-9
 
 
 class NoiseDraws:
-    """AR(1) noise whose strength and colour are as uncertain as their estimates.
+    """Noise whose strength and colour are as uncertain as their estimates.
 
     Args:
         noise: as estimated.
@@ -20,22 +20,25 @@ class NoiseDraws:
     """
 
     def __init__(self, noise: Noise, count: int, rng: np.random.Generator) -> None:
-        self.count = count
+        self.count, self._noise = count, noise
         self.scale = np.maximum(1.0 + noise.relative_error * rng.normal(size=count), 0.1)
         # of n independent numbers, sd is known to 1/sqrt(2 n) of itself and a correlation r to sqrt((1 - r^2) / n)
         error = np.sqrt(2 * (1 - noise.ar1**2)) * noise.relative_error if noise.ar1 > 0 else 0.0
         self.ar1 = np.clip(noise.ar1 + error * rng.normal(size=count), 0.0, 0.99)
 
-    def of(self, shape: tuple[int, ...], rng: np.random.Generator, rows: slice = slice(None)) -> FloatArray:
-        """Noise ``(R, *shape)`` of the replicates ``rows``, in units of the estimated sd; time is the first axis."""
+    def at(self, places: FloatArray, rng: np.random.Generator, rows: slice = slice(None)) -> FloatArray:
+        """Noise ``(R, T, P, A)`` of the replicates ``rows`` at ``places (T, P, A)``, in units of the estimated sd."""
         scale, ar1 = self.scale[rows], self.ar1[rows]
-        out = rng.normal(size=(len(scale), *shape))
+        if self._noise.shared is not None:
+            made = np.stack([self._noise.draw(np.nan_to_num(places), rng) for _ in scale])
+            return np.asarray(made * scale[:, None, None, None])
+        out = rng.normal(size=(len(scale), *places.shape))
         if ar1.any():
-            keep = ar1.reshape(-1, *(1,) * (len(shape) - 1))
+            keep = ar1[:, None, None]
             new = np.sqrt(1 - keep**2)
-            for t in range(1, shape[0]):
+            for t in range(1, len(places)):
                 out[:, t] = keep * out[:, t - 1] + new * out[:, t]
-        out *= scale.reshape(-1, *(1,) * len(shape))
+        out *= scale[:, None, None, None]
         return np.asarray(out)
 
 

@@ -83,7 +83,7 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
     predicted = embed(model[None])[0]
     mmd = np.linalg.norm(embed(measured[None])[0] - predicted, axis=1)
     draws = NoiseDraws(noise, _REPLICATES, rng)
-    made = origin + draws.of(measured.shape, rng) * noise.sd
+    made = origin + draws.at(origin, rng) * noise.sd
     made[..., unmeasured] = origin[..., unmeasured]
     made[:, ~seen] = np.nan
     step = max(1, _CHUNK // (seen.size * _FEATURES))

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,11 +52,11 @@ class Fitted:
         return cls(read(study.step_results("fit"), "estimate_unit"), fit.noise, fit.derivative_step)
 
     def to_json(self) -> dict[str, Any]:
-        return {"unit": self.unit.tolist(), "noise": asdict(self.noise), "step": self.step}
+        return {"unit": self.unit.tolist(), "noise": self.noise.as_dict(), "step": self.step}
 
     @classmethod
     def from_json(cls, content: dict[str, Any]) -> "Fitted":
-        return cls(np.array(content["unit"]), Noise(**content["noise"]), content["step"])
+        return cls(np.array(content["unit"]), Noise.from_dict(content["noise"]), content["step"])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,145 @@
+"""Noise that neighbouring points of a cloud share, told from what a fit leaves.
+
+Depth cameras that do not agree with each other, or with the robot, move whole patches of a cloud, and leave them moved
+for as long as the object is there. Counted as if each were off by itself, hundreds of points a frame would say far more
+than they do, and what the cameras do would pass for the material's doing. How large the noise is no cloud tells, as
+what a model misses looks the same. But how much a patch scatters about a plane shows how far points are off by
+themselves: where that is less than the noise that a person has told would make it, neighbours share the rest.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from ..core.arrays import BoolArray, FloatArray, IntArray
+from .noise import Noise, SharedNoise
+from .residuals import nearest
+
+#: Frames of a recording that are looked at, at most, and points of each.
+_FRAMES, _POINTS = 40, 400
+#: Pairs of points are sorted by distance into so many classes, up to this part of the cloud's extent; so many pairs a
+#: class needs before it says anything.
+_CLASSES, _FARTHEST, _PAIRS = 30, 0.6, 200
+#: Points that make a patch.
+_NEIGHBOURS = 20
+#: Correlation from frame to frame, at most; and the share of the noise below which nothing is called shared.
+_SLOWEST, _LEAST = 0.98, 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """One recording and the best fit to it.
+
+    Args:
+        points: as measured ``(T, P, A)``, offsets taken out [unit]; NaN = not seen.
+        model: places on the model ``(T, Q, A)`` [unit].
+    """
+
+    points: FloatArray
+    model: FloatArray
+
+
+def cloud_noise(noise: Noise, clouds: Sequence[Cloud]) -> Noise:
+    """``noise``, with what neighbours share of it if they do.
+
+    Args:
+        noise: as it was told.
+        clouds: recordings without correspondence, at least one.
+    """
+    rng = np.random.default_rng(71)
+    origins = [nearest(c.points, c.model)[0] for c in clouds]
+    off = [c.points - o for c, o in zip(clouds, origins, strict=True)]
+    width = _FARTHEST * float(np.median([_extent(c.points) for c in clouds])) / _CLASSES
+    same, next_to = (_alike(clouds, off, width, lag) for lag in (0, 1))
+    if not same.known[0]:
+        return noise
+    alone = [o + noise.sd * rng.normal(size=o.shape) for o in origins]
+    share = 1.0 - _scatter([c.points for c in clouds]) / max(_scatter(alone), 1e-300)
+    if share < _LEAST or same.product[0] <= 0.0:
+        return noise
+    reach = same.reach(width)
+    near = same.known & next_to.known & (np.arange(_CLASSES) * width < reach)
+    ar1 = float(np.clip(next_to.product[near].sum() / same.product[near].sum(), 0.0, _SLOWEST)) if near.any() else 0.0
+    numbers, independent = (sum(x) for x in zip(*(_worth(c.points, share, reach, ar1) for c in clouds), strict=True))
+    source = f"{noise.source}, of which neighbours share {100 * share:.0f} % over {reach:.2g} {noise.unit}"
+    return replace(noise, shared=SharedNoise(share, reach, ar1, numbers / independent), source=source)
+
+
+@dataclass(frozen=True, eq=False)
+class _Alike:
+    """Mean product of what two points are off by, a coordinate, in classes of their distance ``(C,)`` [unit2]."""
+
+    product: FloatArray
+    known: BoolArray
+
+    def reach(self, width: float) -> float:
+        """Of a Gaussian correlation: its distance squared is the integral of distance times correlation."""
+        ends = np.flatnonzero(~self.known | (self.product <= 0.0))
+        upto = int(ends[0]) if len(ends) else len(self.product)
+        distance = (np.arange(upto) + 0.5) * width
+        return float(np.sqrt(np.sum(distance * self.product[:upto] / self.product[0]) * width))
+
+
+def _alike(clouds: Sequence[Cloud], off: Sequence[FloatArray], width: float, lag: int) -> _Alike:
+    """Of points of one frame, or of one and the ``lag``-th after it."""
+    total, pairs = np.zeros(_CLASSES), np.zeros(_CLASSES)
+    for cloud, difference in zip(clouds, off, strict=True):
+        frames = len(difference) - lag
+        for t in np.unique(np.linspace(0, frames - 1, min(frames, _FRAMES)).astype(int)):
+            here, there = _some(difference[t]), _some(difference[t + lag])
+            if not len(here) or not len(there):
+                continue
+            apart = cdist(cloud.points[t, here], cloud.points[t + lag, there]) / width
+            product = difference[t, here] @ difference[t + lag, there].T / difference.shape[2]
+            counts = apart < _CLASSES
+            if lag == 0:
+                np.fill_diagonal(counts, False)
+            kind = apart[counts].astype(int)
+            total += np.bincount(kind, product[counts], _CLASSES)
+            pairs += np.bincount(kind, minlength=_CLASSES)
+    return _Alike(total / np.maximum(pairs, 1.0), pairs >= _PAIRS)
+
+
+def _some(difference: FloatArray) -> IntArray:
+    """Numbers of points that were seen, some of them if there are many."""
+    seen = np.flatnonzero(np.isfinite(difference).all(axis=1))
+    return seen[:: max(1, -(-len(seen) // _POINTS))]
+
+
+def _extent(points: FloatArray) -> float:
+    """How far a cloud reaches, in the median over its frames [unit]."""
+    seen = (p[np.isfinite(p).all(axis=1)] for p in points)
+    return float(np.median([np.ptp(p, axis=0).max() for p in seen if len(p)] or [0.0]))
+
+
+def _scatter(clouds: Sequence[FloatArray]) -> float:
+    """Variance of points about the plane through their neighbours, the median over all points [unit2].
+
+    What a fold adds, or a second layer, is in few of them.
+    """
+    found = []
+    for points in clouds:
+        for frame in points[np.unique(np.linspace(0, len(points) - 1, min(len(points), _FRAMES)).astype(int))]:
+            seen = frame[np.isfinite(frame).all(axis=1)]
+            if len(seen) > _NEIGHBOURS:
+                patches = seen[cKDTree(seen).query(seen, _NEIGHBOURS)[1]]
+                patches -= patches.mean(axis=1, keepdims=True)
+                found.append(np.linalg.eigvalsh(np.swapaxes(patches, 1, 2) @ patches / _NEIGHBOURS)[:, 0])
+    return float(np.median(np.concatenate(found))) if found else 0.0
+
+
+def _worth(points: FloatArray, share: float, reach: float, ar1: float) -> tuple[float, float]:
+    """How many numbers of a coordinate there are, and how many independent ones their mean is worth."""
+    counts, within = [], []
+    for frame in points:
+        some = frame[_some(frame)]
+        if len(some):
+            counts.append(int(np.isfinite(frame).all(axis=1).sum()))
+            within.append(float(np.mean(np.exp(-(cdist(some, some) ** 2) / (2.0 * reach**2)))))
+    numbers = float(sum(counts))
+    apart = np.abs(np.subtract.outer(np.arange(len(counts)), np.arange(len(counts))))
+    variance = share * float(np.mean(within)) * float(np.mean(ar1**apart)) + (1.0 - share) / numbers
+    return numbers, 1.0 / variance
