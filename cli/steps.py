@@ -8,7 +8,7 @@ import typer
 from ..core.errors import InputError
 from ..core.registry import REGISTRY
 from ..core.study import Study
-from .adding import add_commands, with_effect
+from .adding import add_command, with_effects
 from .console import ProgressView, command, next_step, say
 from .output import check_apart, check_output, check_result, write_json
 
@@ -88,7 +88,7 @@ def diagnose(
         tied, beside = verdict.get("verdict") == "tied", verdict.get("further") or []
         chosen = [effects[0], *beside] if tied else effects
         further = [command("next", study)] if tied or beside else []
-        next_step(add_commands(study, chosen), *further, command("report", study))
+        next_step(add_command(study, chosen), *further, command("report", study))
     else:
         further = {"none": ["unknown"], "cannot-tell": ["next"]}.get(str(verdict.get("verdict")), [])
         in_pixels = verdict.get("error", {}).get("unit") == "px"  # unknown needs metres
@@ -100,7 +100,7 @@ def diagnose(
 def add(
     effect: Annotated[
         str | None,
-        typer.Argument(metavar="EFFECT", help="Name of an effect; muslin plugins lists them. None with --law."),
+        typer.Argument(metavar="EFFECT[,EFFECT]", help="Names of effects; muslin plugins lists them. None with --law."),
     ] = None,
     study: Annotated[
         Path | None, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")
@@ -116,26 +116,27 @@ def add(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Write a study of the same model with one more effect, its coefficients inferred from the recordings."""
+    """Write a study of the same model with more effects, their coefficients inferred from the recordings."""
     if effect is None:
         raise InputError("name what to add and to which study: muslin add EFFECT STUDY.toml, or --law FILE STUDY.toml")
     if law is not None and study is not None:
         raise InputError(f"name either the effect {effect!r} or a law, not both: muslin add --law FILE STUDY.toml")
     if law is None and study is None:
         raise InputError(f"name an effect and a study, or a law file and a study; got {effect!r} alone")
-    source, what = (Path(effect), f"the law of {law}") if study is None else (study, effect)
-    name = effect if law is None else "law"
-    target = output or with_effect(source, name)
+    source = Path(effect) if study is None else study
+    names = [name.strip() for name in effect.split(",")] if law is None else ["law"]
+    target = output or with_effects(source, names)
     loaded = Study.load(source)
     check_apart(target, loaded)
     check_output(target, force)
     if law is not None and target.resolve() == law.resolve():
         raise InputError(f"{law} is the law itself; name another file to write")
     made = (
-        loaded.add(effect, target, overwrite=force)
+        loaded.add(names, target, overwrite=force)
         if law is None
         else REGISTRY.get("step", "add-law")(loaded, law, target, overwrite=force)
     )
+    what = " and ".join(names) if law is None else f"the law of {law}"
     say(f"wrote {made.path}: the model of {source} with {what}")
     next_step(
         f"{command('fit', made.path)} && {command('compare', made.path)} && "

@@ -48,14 +48,12 @@ def study(folder: Path) -> Path:
     found = result["effects"]
     if result["verdict"] == "tied":  # one of those that are tied, and what is missing whichever it is
         found = [found[0], *result["further"]]
-    studies = ["study.toml", *(f"study{k + 2}.toml" for k in range(len(found)))]
-    for effect, source, target in zip(found, studies, studies[1:], strict=False):
-        muslin(folder, "add", effect, source, "-o", target)
     after = []
     if found:
-        muslin(folder, "fit", studies[-1])
-        muslin(folder, "compare", studies[-1])
-        after = ["--after", studies[-1]]
+        muslin(folder, "add", ",".join(found), "study.toml", "-o", "study2.toml")
+        muslin(folder, "fit", "study2.toml")
+        muslin(folder, "compare", "study2.toml")
+        after = ["--after", "study2.toml"]
     muslin(folder, "report", "study.toml", *after, "-o", "report.html")
     return folder / "report.html"
 

@@ -193,7 +193,7 @@ def commands(found: Findings) -> list[str]:
     if found.after is not None and found.after_inferred:
         other = _quoted(found.after.path.name)
         added = [e for e in found.after.config.effects if e not in found.study.config.effects]
-        out += [f"muslin add {e} {file} -o {other}" for e in added[:1]]
+        out += [f"muslin add {','.join(added)} {file} -o {other}"] if added else []
         out += [f"muslin fit {other}", f"muslin compare {other}"]
     return [*out, f"muslin report {file}"]
 

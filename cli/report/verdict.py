@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ...core.errors import MuslinError
 from ...core.study.objects import object_of
-from ..adding import add_commands
+from ..adding import add_command
 from .findings import Findings, number
 from .words import errors, fall, length, sentence, words
 
@@ -83,7 +83,7 @@ def _diagnosed(found: Findings) -> Verdict:
     became = f"is {before}" if both[0] is None or both[1] is None else fall(both[0], both[1], e["unit"])
     if result["verdict"] == "named":
         drop = f"the {e['on']} error {became} ({floor})"
-        add = "" if found.after_inferred else add_commands(Path(file), effects)
+        add = "" if found.after_inferred else add_command(Path(file), effects)
         verb, it = ("are", "them") if len(effects) > 1 else ("is", "it")
         within = _after(found, effects)
         told = _cap(f"{named} {verb} missing from the model; with {it if within == named else within}, {drop}.")
@@ -95,7 +95,7 @@ def _diagnosed(found: Findings) -> Verdict:
         if effects and number(e["after"]) is not None:
             within = _after(found, [effects[0], *beside])
             drop = f"With {within}, the {e['on']} error {became} ({floor})."
-        add = "" if found.after_inferred or not effects else add_commands(Path(file), [effects[0], *beside])
+        add = "" if found.after_inferred or not effects else add_command(Path(file), [effects[0], *beside])
         missing = f"{_cap(rivals)} is missing from the model; these recordings cannot tell which."
         if beside:
             missing += f" Whichever it is, {' and '.join(words(n) for n in beside)} is missing, too."

@@ -2,7 +2,7 @@
 
 import hashlib
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -190,39 +190,37 @@ class Study:
 
     def add(
         self,
-        effect: str,
+        effects: str | Sequence[str],
         output: str | Path | None = None,
         *,
         overwrite: bool = False,
         coefficients: Mapping[str, float | ParameterTable] | None = None,
     ) -> "Study":
-        """A study of the same model with one more effect, its coefficients inferred.
+        """A study of the same model with more effects, their coefficients inferred.
 
         Args:
-            effect: name of an effect plugin.
-            output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one.
+            effects: name of an effect plugin, or several.
+            output: the new study file; default ``STEM-with-EFFECT.toml`` beside this one, of several
+                ``STEM-with-EFFECT-and-EFFECT.toml``.
             overwrite: replace a file that is there.
-            coefficients: fixed values and priors, as the study file takes them; those not named are inferred under
-                the effect's own priors.
+            coefficients: of a single effect, fixed values and priors, as the study file takes them; those not named are
+                inferred under the effect's own priors.
 
         Raises:
-            InputError: the study has it already, the file is there, or the effect is no candidate and has several
-                coefficients, of which it must be told some: all of them at once are more than recordings tell.
+            InputError: the study has one of them already, or it is named twice; the file is there; an effect is no
+                candidate and has several coefficients, of which it must be told some: all of them at once are more
+                than recordings tell; or coefficients are given for several effects.
         """
-        added = REGISTRY.get("effect", effect)
-        if not added.candidate and len(added.coefficients) > 1 and coefficients is None:
-            raise InputError(
-                f"{effect!r} must be told which of its coefficients to infer: give them to Study.add, or add a law "
-                f"that muslin unknown has found: muslin unknown {self.path} --json law.json, then "
-                f"muslin add --law law.json {self.path}"
-            )
-        if effect in self.config.effects:
-            raise InputError(f"{self.path} has {effect!r} already")
-        path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{effect}.toml")
+        names = [effects] if isinstance(effects, str) else list(effects)
+        if coefficients is not None and len(names) != 1:
+            raise InputError(f"coefficients are of one effect, but {len(names)} are added; add one after the other")
+        config = self.config.model_copy(deep=True)
+        for name in names:
+            self._check_added(name, config.effects, coefficients is not None)
+            config.effects[name] = dict(coefficients or {})
+        path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{'-and-'.join(names)}.toml")
         if path.exists() and not overwrite:
             raise InputError(f"{path} exists already; name another file, or say overwrite=True (--force)")
-        config = self.config.model_copy(deep=True)
-        config.effects[effect] = dict(coefficients or {})
         if config.study.results is not None:
             config.study.results = f"{path.stem}.results.zarr"
         if path.parent.resolve() != self.path.parent.resolve():
@@ -232,6 +230,20 @@ class Study:
         study.problem  # noqa: B018  an effect that cannot act here is refused before anything is written
         study.save()
         return study
+
+    def _check_added(self, name: str, there: Mapping[str, Any], told: bool) -> None:
+        """Refuse an effect that is among those ``there``, or of which must be ``told`` what to infer."""
+        added = REGISTRY.get("effect", name)
+        if not added.candidate and len(added.coefficients) > 1 and not told:
+            raise InputError(
+                f"{name!r} must be told which of its coefficients to infer: give them to Study.add, or add a law "
+                f"that muslin unknown has found: muslin unknown {self.path} --json law.json, then "
+                f"muslin add --law law.json {self.path}"
+            )
+        if name in self.config.effects:
+            raise InputError(f"{self.path} has {name!r} already")
+        if name in there:
+            raise InputError(f"{name!r} is named twice; name every effect once")
 
 
 def _digest(recording: Recording) -> str:

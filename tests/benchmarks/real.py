@@ -59,9 +59,8 @@ def row_of(case: Case, study: Study) -> dict[str, Any]:
             for c in found["candidates"][:5]
         ],
     }
-    better = None
-    for effect in found["effects"][: 1 if found["verdict"] == "tied" else None]:
-        better = (better or study).add(effect)
+    named = found["effects"][: 1 if found["verdict"] == "tied" else None]
+    better = study.add(named) if named else None
     if better is not None:
         after = better.fit()
         row["after"] = rms([r.rmse for r in better.compare().rows if r.role == "held-out"])

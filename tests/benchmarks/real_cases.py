@@ -125,9 +125,7 @@ def given(case: Case, told: str, *effects: str) -> Case:
     """The same with ``effects``, whatever a diagnosis says."""
 
     def make(folder: Path, workers: int | None) -> Study:
-        study = case.make(folder, workers)
-        for effect in effects:
-            study = study.add(effect)
+        study = case.make(folder, workers).add(effects)
         config = study.config.model_copy(deep=True)
         config.diagnose.simulations = 300
         write_config(config, study.path)
@@ -149,7 +147,7 @@ def carried_cloth(folder: Path, workers: int | None) -> Study:
 
 def carried_in_air(folder: Path, workers: int | None) -> Study:
     """The same with what the air does to a sheet, whatever a diagnosis says, and so stiff a cloth as it then takes."""
-    study = carried_cloth(folder, workers).add("air-drag").add("added-mass")
+    study = carried_cloth(folder, workers).add(["air-drag", "added-mass"])
     config = study.config.model_copy(deep=True)
     config.parameters["bending_rigidity"] = ParameterTable(low=2e-6, high=5e-3, scale="log")
     config.parameters["stretch_stiffness"] = ParameterTable(low=30.0, high=3000.0, scale="log")

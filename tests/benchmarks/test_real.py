@@ -124,7 +124,7 @@ def row_with(monkeypatch: pytest.MonkeyPatch, verdict: str, effects: list[str]) 
         "told": {"where": "At the end."},
     }
     study.diagnose = lambda: SimpleNamespace(result=found)
-    study.add = better.add = lambda effect: added.append(effect) or better
+    study.add = lambda effects: added.extend(effects) or better
     monkeypatch.setattr(real, "posterior", lambda s: {})
     monkeypatch.setattr(real, "measures", lambda s: {"coverage": 0.9 if s is better else 0.1})
     return real.row_of(Case("ball: golf", Path(), lambda folder, workers: study), study), added

@@ -81,12 +81,11 @@ def test_all_that_was_named_is_added_by_the_next_command(
 ) -> None:
     step("diagnose", lambda s: Result({"verdict": "named", "effects": ["wind", "gravity-tilt"]}))
     assert status("diagnose", str(study)) == 0
-    between = study.with_name(f"{study.stem}-with-wind.toml")
-    assert f"muslin add wind {study} -o {between} && muslin add gravity-tilt {between} -o" in capsys.readouterr().out
+    assert f"muslin add wind,gravity-tilt {study}" in capsys.readouterr().out
     step("diagnose", lambda s: Result({"verdict": "tied", "effects": ["wind", "gravity-tilt"], "further": ["hem"]}))
     assert status("diagnose", str(study)) == 0
     told = capsys.readouterr().out
-    assert f"muslin add wind {study} -o {between} && muslin add hem {between} -o" in told and "add gravity" not in told
+    assert f"muslin add wind,hem {study}" in told and "add gravity" not in told
     for further, more in ((["hem", "lag"], True), ([], False)):  # which one is missing, too, another motion may tell
         found = {"verdict": "named", "effects": ["wind"], "further": further}
         step("diagnose", lambda s, found=found: Result(found))  # type: ignore[misc]
@@ -153,6 +152,18 @@ def test_add_writes_a_study_with_the_effect(study: Path, capsys: pytest.CaptureF
     assert status("add", "law", str(study)) == 2  # no candidate
     assert f"then muslin add --law law.json {study}" in capsys.readouterr().err
     assert not study.with_name("study-with-law.toml").exists()
+
+
+def test_add_writes_a_study_with_several_effects(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert status("add", "air-drag, hem", str(study)) == 0
+    both = study.with_name("study-with-air-drag-and-hem.toml")
+    assert read_config(both).effects == {"air-drag": {}, "hem": {}}
+    assert "with air-drag and hem" in capsys.readouterr().out
+    assert status("add", "wind,wind", str(study)) == 2 and "named twice" in capsys.readouterr().err
+    assert status("add", "wind,hem", str(both)) == 2 and "has 'hem' already" in capsys.readouterr().err
+    assert status("add", "wind,", str(study)) == 2
+    with pytest.raises(InputError, match="of one effect"):
+        Study.load(study).add(["wind", "hem"], coefficients={"velocity_x": 1.0})
 
 
 def test_import_of_several_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

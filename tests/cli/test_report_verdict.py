@@ -44,7 +44,7 @@ def test_what_is_missing_beside_tied_effects_is_told(tmp_path: Path) -> None:
     group.attrs["result"] = {**group.attrs["result"], **tied}
     text = page_of(study).text
     assert "Whichever it is, wind is missing, too. With air drag and wind, the" in text
-    assert "-o cloth-with-air-drag.toml && muslin add wind cloth-with-air-drag.toml -o" in text
+    assert "muslin add air-drag,wind cloth.toml" in text
 
 
 def test_what_is_missing_is_not_told_as_not_to_be_seen(tmp_path: Path) -> None:
