@@ -68,6 +68,10 @@ class Problem:
         """Into how many a recording that is fitted was cut, in the mean."""
         return len(self.cut_from) / len(set(self.cut_from.values())) if self.cut_from else 1.0
 
+    def told_as(self, rollouts: int) -> int:
+        """So many simulations: the pieces of a recording cost as much as the whole, so they count as one."""
+        return round(rollouts / self.pieces)
+
     def simulate(self, values: Mapping[str, float], recording: str) -> Trajectory:
         """One rollout; ``values`` names material fields, ``scale``, and ``effect.coefficient``.
 

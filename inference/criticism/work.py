@@ -70,8 +70,8 @@ class Work:
 
     @property
     def simulations(self) -> int:
-        """What those are told as: the pieces of a recording cost as much as the whole, so they count as one."""
-        return round(self.count / self.problem.pieces)
+        """What those are told as."""
+        return self.problem.told_as(self.count)
 
     def may_go_on(self, until: float = float("inf")) -> bool:
         """Is something left of the budget, ``until`` so many? That it was not is remembered: :attr:`cut_short`."""

@@ -82,7 +82,7 @@ def _fit(study: Study, noise: Noise, takes: Takes) -> FitResult:
             learner = Learner(study, takes)
             posterior = learner.learn(theta, points, numbers, proposals, k)
             best, step, found = _polished(study, pool, store, noise, takes, upto)
-        simulations = upto * len(takes.simulated) + pool.count - before
+        simulations = problem.told_as(upto * len(takes.simulated) + pool.count - before)
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))
     held = at_bounds(samples, best.unit, np.sqrt(np.diag(best.widened)))
     warnings = [

@@ -81,6 +81,18 @@ def test_a_fit_tells_what_is_known_past_chance(small_study: Study, monkeypatch: 
     np.testing.assert_allclose(sd, fitting.physical_sd(small_study.problem.space, told[-1].unit, kept))
 
 
+def test_pieces_of_a_recording_count_as_one_simulation(
+    small_study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = small_study.problem
+    halves = replace(problem, cut_from={f"{n} {k}": n for n in ("near", "far") for k in "ab"})
+    assert (problem.told_as(10), halves.told_as(10)) == (10, 5)
+    plain = small_study.fit().simulations
+    monkeypatch.setattr(type(problem), "told_as", lambda self, rollouts: round(rollouts / 2))
+    again = Study.load(write_study(tmp_path / "again", small_measurement()), workers=0)
+    assert again.fit().simulations == pytest.approx(plain / 2, abs=1)
+
+
 def test_a_finished_fit_is_returned_and_not_run_again(small_study: Study) -> None:
     first = small_study.fit()
     began = time.monotonic()
