@@ -48,7 +48,7 @@ class Residual:
     @property
     def rms(self) -> float:
         """Root mean square over all seen coordinates [unit]."""
-        return float(_rms(self.difference, (0, 1, 2)))
+        return rms(self.difference)
 
     @property
     def by_time(self) -> FloatArray:
@@ -59,6 +59,11 @@ class Residual:
     def by_point(self) -> FloatArray:
         """The same of every point ``(P,)``; NaN where it was never seen."""
         return _rms(self.difference, (0, 2))
+
+
+def rms(difference: FloatArray) -> float:
+    """Root mean square of what was seen; NaN if nothing was."""
+    return float(_rms(difference, tuple(range(difference.ndim))))
 
 
 def _rms(difference: FloatArray, axes: tuple[int, ...]) -> FloatArray:

@@ -16,14 +16,15 @@ from ...core.study import Outcome, Study, Task
 from ..discrepancy import Discrepancy
 from ..noise import Noise
 from ..polish import Objective
-from ..residuals import residual
+from ..residuals import residual, rms
 from ..sequential.fitting import offsets_of
-from ..sequential.result import FitResult, load_fit
+from ..sequential.result import load_fit
 from .comparing.adequacy import adequacy
 from .comparing.excess import excess, sentence
 from .comparing.groups import motion_of, partitions
 from .comparing.held import Held
-from .comparing.result import Comparison, Row, sets_sentence
+from .comparing.joining import rejoined
+from .comparing.result import Comparison, Row, pieces_sentence, sets_sentence
 from .comparing.sets import SetView, set_view
 from .comparing.writing import write_take
 
@@ -57,15 +58,17 @@ def compare(study: Study) -> Comparison:
         objective = Objective(pool, problem.space, problem.fit_on, fit.noise, offsets, discrepancy=discrepancy)
         jacobian = objective.jacobian(unit)
     study.progress("comparing with what noise gives", 0, 0)
-    sorted_by, fitted = partitions(takes), takes[: len(problem.fit_on)]
+    fitted = takes[: len(problem.fit_on)]
     tested = adequacy(fitted, partitions(fitted), jacobian, unit, fit.noise, offsets, rng)
+    takes = rejoined(takes, problem.cut_from)
+    sorted_by = partitions(takes)
     groups = excess(takes, sorted_by, fit.noise, rng)
     sets = [set_view(h, fit.noise, rng) for h in takes]
-    unfitted = outcomes[1 :: len(values)]
-    rows = tuple(_row(study, h, fit, plain, s) for h, plain, s in zip(takes, unfitted, sets, strict=True))
+    rows = tuple(_row(h, fit.noise, s) for h, s in zip(takes, sets, strict=True))
     loose = tuple(r for r, h in zip(rows, takes, strict=True) if not h.paired)
+    alike = sets_sentence(loose) if loose else ""
     result = Comparison(
-        rows, tested, tuple(groups), sentence(groups, len(takes)), sets_sentence(loose) if loose else ""
+        rows, tested, tuple(groups), sentence(groups, len(takes)), alike, pieces_sentence(problem.pieces)
     )
     with storage_errors(study.results_path):
         group = study.results("r+").create_group("compare", overwrite=True)
@@ -79,25 +82,27 @@ def compare(study: Study) -> Comparison:
 def _held(study: Study, name: str, outcomes: Sequence[Outcome], noise: Noise) -> Held:
     """``outcomes``: of the best fit, of the unfitted model, and of the posterior draws."""
     recording, scenario = study.problem.recordings[name], study.problem.scenarios[name]
-    best, _, *draws = outcomes
+    best, plain, *draws = outcomes
+    offsets = offsets_of(study)
     if not isinstance(best, Trajectory):
         raise MuslinError(f"the best fit cannot be simulated on recording {name!r}: {best.reason}")
     predicted = [o.series.points for o in draws if isinstance(o, Trajectory)]
+    nowhere = np.full(recording.series.points.shape, np.nan)
     return Held(
         recording,
         scenario,
         name in study.problem.fit_on,
         best,
-        residual(recording, best.series, noise, offsets_of(study)),
+        residual(recording, best.series, noise, offsets),
         np.stack(predicted) if predicted else np.zeros((0, *best.series.points.shape)),
         study.problem.extractor.uses_markers,
+        residual(recording, carried(recording, scenario), noise, offsets).difference,
+        residual(recording, plain.series, noise, offsets).difference if isinstance(plain, Trajectory) else nowhere,
     )
 
 
-def _row(study: Study, held: Held, fit: FitResult, unfitted: Outcome, sets: SetView) -> Row:
-    recording, noise, offsets = held.recording, fit.noise, offsets_of(study)
-    time = recording.series.time
-    plain = residual(recording, unfitted.series, noise, offsets).rms if isinstance(unfitted, Trajectory) else np.nan
+def _row(held: Held, noise: Noise, sets: SetView) -> Row:
+    time = held.recording.series.time
     scatter = np.std(held.draws, axis=0) if len(held.draws) > 1 else np.zeros(1)
     return Row(
         recording=held.name,
@@ -105,11 +110,11 @@ def _row(study: Study, held: Held, fit: FitResult, unfitted: Outcome, sets: SetV
         rmse=held.residual.rms,
         noise=noise.sd,
         scatter=float(np.sqrt(np.mean(scatter**2))),
-        baseline=residual(recording, carried(recording, held.scenario), noise, offsets).rms,
-        default=float(plain),
+        baseline=rms(held.baseline),
+        default=rms(held.unfitted),
         worst_time=float(time[int(np.nanargmax(held.residual.by_time))]),
         worst_point=int(np.nanargmax(held.residual.by_point)),
-        unit=recording.series.unit,
+        unit=held.recording.series.unit,
         clock_offset=held.residual.clock,
         sets_beyond=sets.beyond,
         sets_p_value=sets.p_value,

@@ -1,6 +1,6 @@
 """One recording held against the best prediction of it, and the numbers that are compared."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,8 @@ class Held:
         residual: measured minus predicted, offsets taken out.
         draws: predictions of posterior draws ``(K, T, Q, A)`` [unit].
         marked: the predicted points are the markers of the scenario, and were not found in pictures.
+        baseline: measured minus the first measured shape, carried along by the gripper ``(T, P, A)`` [unit].
+        unfitted: measured minus what the unfitted model predicts, in the same way; NaN if it cannot be simulated.
     """
 
     recording: Recording
@@ -35,6 +37,8 @@ class Held:
     residual: Residual
     draws: FloatArray
     marked: bool = True
+    baseline: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
+    unfitted: FloatArray = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
     @property
     def name(self) -> str:

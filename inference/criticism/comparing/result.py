@@ -54,6 +54,7 @@ class Comparison:
         groups: errors by recording, phase, contact, distance from the grasp, and place.
         where: the same in a sentence.
         sets: a sentence on points without correspondence; "" where all correspond.
+        in_pieces: that fitted recordings are predicted in pieces, in a sentence; "" where they are not.
     """
 
     rows: tuple[Row, ...]
@@ -61,6 +62,7 @@ class Comparison:
     groups: tuple[Group, ...]
     where: str
     sets: str
+    in_pieces: str = ""
 
     @property
     def p_value(self) -> float:
@@ -104,7 +106,7 @@ class Comparison:
             )
             lines.append(f"{r.recording:<{wide}} {r.role:<9}{cells}  {r.worst_time:.2f} s, point {r.worst_point}")
         verdict = " ".join(s for s in (self.adequacy.text(), self.elsewhere) if s)
-        return "\n".join([*lines, *(s for s in (self.where, self.sets, verdict) if s)])
+        return "\n".join([*lines, *(s for s in (self.in_pieces, self.where, self.sets, verdict) if s)])
 
     def to_json(self) -> dict[str, Any]:
         """Everything that was found, as plain values; lengths in the unit of the recordings."""
@@ -117,9 +119,20 @@ class Comparison:
             "elsewhere": self.elsewhere,
             "where": self.where,
             "sets": self.sets,
+            "in_pieces": self.in_pieces,
             "groups": [asdict(g) for g in self.groups],
             "rows": [asdict(r) for r in self.rows],
         }
+
+
+def pieces_sentence(pieces: float) -> str:
+    """How recordings that were cut into so many ``pieces`` in the mean are told of; "" if they were not."""
+    if pieces == 1.0:
+        return ""
+    return (
+        f"Fitted recordings are predicted in pieces ({pieces:.2g} of each, in the mean), each from where it starts; "
+        "held-out ones in one go."
+    )
 
 
 def sets_sentence(rows: tuple[Row, ...]) -> str:
