@@ -16,7 +16,6 @@ from scipy.spatial.distance import cdist
 
 from ..core.arrays import BoolArray, FloatArray, IntArray
 from .noise import Noise, SharedNoise
-from .residuals import nearest
 
 #: Frames of a recording that are looked at, at most, and points of each.
 _FRAMES, _POINTS = 40, 400
@@ -31,15 +30,15 @@ _SLOWEST, _LEAST = 0.98, 0.2
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """One recording and the best fit to it.
+    """One recording and what the best fit leaves of it.
 
     Args:
-        points: as measured ``(T, P, A)``, offsets taken out [unit]; NaN = not seen.
-        model: places on the model ``(T, Q, A)`` [unit].
+        points: as measured ``(T, P, A)`` [unit]; NaN = not seen.
+        off: measured minus the nearest place of the model, offsets taken out ``(T, P, A)`` [unit].
     """
 
     points: FloatArray
-    model: FloatArray
+    off: FloatArray
 
 
 def cloud_noise(noise: Noise, clouds: Sequence[Cloud]) -> Noise:
@@ -50,15 +49,14 @@ def cloud_noise(noise: Noise, clouds: Sequence[Cloud]) -> Noise:
         clouds: recordings without correspondence, at least one.
     """
     rng = np.random.default_rng(71)
-    origins = [nearest(c.points, c.model)[0] for c in clouds]
-    off = [c.points - o for c, o in zip(clouds, origins, strict=True)]
     width = _FARTHEST * float(np.median([_extent(c.points) for c in clouds])) / _CLASSES
-    same, next_to = (_alike(clouds, off, width, lag) for lag in (0, 1))
+    same, next_to = (_alike(clouds, width, lag) for lag in (0, 1))
     if not same.known[0]:
         return noise
-    alone = [o + noise.sd * rng.normal(size=o.shape) for o in origins]
-    share = 1.0 - _scatter([c.points for c in clouds]) / max(_scatter(alone), 1e-300)
-    if share < _LEAST or same.product[0] <= 0.0:
+    # what is shared is seen across the surface alone, one of the coordinates, as the nearest place follows along it
+    seen = clouds[0].off.shape[2] * same.product[0] / noise.sd**2
+    share = float(min(1.0 - _scatter(clouds) / max(_scatter(clouds, noise.sd, rng), 1e-300), seen))
+    if share < _LEAST:
         return noise
     reach = same.reach(width)
     near = same.known & next_to.known & (np.arange(_CLASSES) * width < reach)
@@ -83,17 +81,16 @@ class _Alike:
         return float(np.sqrt(np.sum(distance * self.product[:upto] / self.product[0]) * width))
 
 
-def _alike(clouds: Sequence[Cloud], off: Sequence[FloatArray], width: float, lag: int) -> _Alike:
+def _alike(clouds: Sequence[Cloud], width: float, lag: int) -> _Alike:
     """Of points of one frame, or of one and the ``lag``-th after it."""
     total, pairs = np.zeros(_CLASSES), np.zeros(_CLASSES)
-    for cloud, difference in zip(clouds, off, strict=True):
-        frames = len(difference) - lag
-        for t in np.unique(np.linspace(0, frames - 1, min(frames, _FRAMES)).astype(int)):
-            here, there = _some(difference[t]), _some(difference[t + lag])
+    for cloud in clouds:
+        for t in _frames(len(cloud.off) - lag):
+            here, there = _some(cloud.off[t]), _some(cloud.off[t + lag])
             if not len(here) or not len(there):
                 continue
             apart = cdist(cloud.points[t, here], cloud.points[t + lag, there]) / width
-            product = difference[t, here] @ difference[t + lag, there].T / difference.shape[2]
+            product = cloud.off[t, here] @ cloud.off[t + lag, there].T / cloud.off.shape[2]
             counts = apart < _CLASSES
             if lag == 0:
                 np.fill_diagonal(counts, False)
@@ -103,9 +100,14 @@ def _alike(clouds: Sequence[Cloud], off: Sequence[FloatArray], width: float, lag
     return _Alike(total / np.maximum(pairs, 1.0), pairs >= _PAIRS)
 
 
-def _some(difference: FloatArray) -> IntArray:
+def _frames(count: int) -> IntArray:
+    """Of so many frames those that are looked at."""
+    return np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).astype(int))
+
+
+def _some(places: FloatArray) -> IntArray:
     """Numbers of points that were seen, some of them if there are many."""
-    seen = np.flatnonzero(np.isfinite(difference).all(axis=1))
+    seen = np.flatnonzero(np.isfinite(places).all(axis=1))
     return seen[:: max(1, -(-len(seen) // _POINTS))]
 
 
@@ -115,20 +117,33 @@ def _extent(points: FloatArray) -> float:
     return float(np.median([np.ptp(p, axis=0).max() for p in seen if len(p)] or [0.0]))
 
 
-def _scatter(clouds: Sequence[FloatArray]) -> float:
+def _scatter(clouds: Sequence[Cloud], sd: float = 0.0, rng: np.random.Generator | None = None) -> float:
     """Variance of points about the plane through their neighbours, the median over all points [unit2].
 
-    What a fold adds, or a second layer, is in few of them.
+    What a fold adds, or a second layer, is in few of them. Given ``rng``, not that of the clouds as they are, but laid
+    flat patch by patch and with white noise ``sd`` of every coordinate.
     """
     found = []
-    for points in clouds:
-        for frame in points[np.unique(np.linspace(0, len(points) - 1, min(len(points), _FRAMES)).astype(int))]:
+    for cloud in clouds:
+        for frame in cloud.points[_frames(len(cloud.points))]:
             seen = frame[np.isfinite(frame).all(axis=1)]
-            if len(seen) > _NEIGHBOURS:
-                patches = seen[cKDTree(seen).query(seen, _NEIGHBOURS)[1]]
-                patches -= patches.mean(axis=1, keepdims=True)
-                found.append(np.linalg.eigvalsh(np.swapaxes(patches, 1, 2) @ patches / _NEIGHBOURS)[:, 0])
+            if len(seen) <= _NEIGHBOURS:
+                continue
+            variance, normal, middle = _planes(seen)
+            if rng is not None:
+                height = np.sum((seen - middle) * normal, axis=1)
+                variance = _planes(seen - height[:, None] * normal + sd * rng.normal(size=seen.shape))[0]
+            found.append(variance)
     return float(np.median(np.concatenate(found))) if found else 0.0
+
+
+def _planes(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Of the patch about every point ``(N, A)``: variance across its plane ``(N,)``, the plane's normal, the middle."""
+    patches = points[cKDTree(points).query(points, _NEIGHBOURS)[1]]
+    middle = patches.mean(axis=1)
+    patches -= middle[:, None]
+    variances, axes = np.linalg.eigh(np.swapaxes(patches, 1, 2) @ patches / _NEIGHBOURS)
+    return variances[:, 0], axes[:, :, 0], middle
 
 
 def _worth(points: FloatArray, share: float, reach: float, ar1: float) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Measured minus predicted, in units of the noise, with clock and constant offsets taken out."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -37,13 +37,11 @@ class Residual:
         white: the same in units of the noise ``(N,)``, see :func:`_weighted`, and one number for each
             offset under its prior; its sum of squares is minus twice the log posterior.
         clock: offset of the measurement's clock that was taken out [s].
-        constant: offset of all points that was taken out ``(A,)`` [unit], or ``(1,)`` zero.
     """
 
     difference: FloatArray
     white: FloatArray
     clock: float = 0.0
-    constant: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @property
     def rms(self) -> float:
@@ -105,7 +103,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         parts.append(np.array([clock / offsets.clock]))
     if offsets.constant > 0:
         parts.append(constant / offsets.constant)
-    return Residual(difference, np.concatenate(parts), clock, constant)
+    return Residual(difference, np.concatenate(parts), clock)
 
 
 def rms_apart(pairs: Iterable[tuple[FloatArray, FloatArray]]) -> float:

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ...core.errors import MuslinError
-from ...core.interpolation import interpolate
 from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.series import PointSeries
@@ -122,12 +121,11 @@ def _truer(study: Study, pool: SimulationPool, best: Polished, noise: Noise) -> 
     for recording, outcome in zip((problem.recordings[n] for n in problem.fit_on), outcomes, strict=True):
         if not isinstance(outcome, Trajectory):
             continue
-        found, time = residual(recording, outcome.series, noise, offsets), recording.series.time
+        off = residual(recording, outcome.series, noise, offsets).difference
         if recording.series.correspondence:
-            differences.append(found.difference)
+            differences.append(off)
         elif recording.name in problem.clouds:
-            model = interpolate(time + found.clock, time, outcome.series.points)
-            clouds.append(Cloud(recording.series.points - found.constant, model))
+            clouds.append(Cloud(recording.series.points, off))
     if differences or not clouds:
         return correlated_noise(noise, differences)
     return cloud_noise(noise, clouds)

@@ -1,5 +1,7 @@
 """Neighbours of a cloud that are off together are told from each being off by itself, and count as the few they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,7 +15,7 @@ from muslin.inference.criticism.comparing.replicates import NoiseDraws
 from muslin.inference.noise import Noise, SharedNoise
 from muslin.inference.noise_draws import smooth_noise
 from muslin.inference.observe import Observer
-from muslin.inference.residuals import Offsets
+from muslin.inference.residuals import Offsets, nearest
 
 SD = 0.01
 TOLD = Noise(SD, 0.0, "given in the study", "m", 0.02)
@@ -28,14 +30,14 @@ def sheet(places: FloatArray, height: float = 0.03) -> FloatArray:
 
 
 def seen(noise: Noise, seed: int, count: int = 500) -> Cloud:
-    """A cloud of other points in every frame, gaps among them, and the sheet that it is of."""
+    """A cloud of other points in every frame, gaps among them, held against the sheet that it is of."""
     rng = np.random.default_rng(seed)
     true = sheet(rng.uniform(0, 0.3, (len(TIME), count, 2)))
     points = true + noise.sd * noise.draw(true, rng)
     points[rng.random(points.shape[:2]) < 0.1] = np.nan
     side = np.linspace(0, 0.3, 45)
     lattice = np.stack(np.meshgrid(side, side), axis=-1).reshape(1, -1, 2)
-    return Cloud(points, sheet(np.repeat(lattice, len(TIME), axis=0)))
+    return Cloud(points, points - nearest(points, sheet(np.repeat(lattice, len(TIME), axis=0)))[0])
 
 
 def shared(share: float, reach: float, ar1: float) -> Noise:
@@ -52,18 +54,24 @@ def test_what_neighbours_share_is_found(share: float, reach: float, ar1: float) 
     assert found.shared.ar1 == pytest.approx(ar1, abs=0.15)
 
 
-@pytest.mark.parametrize("misfit", [0.0, 0.01])
-def test_points_that_are_off_by_themselves_stay_so_whatever_the_model_misses(misfit: float) -> None:
-    clouds = [seen(TOLD, k) for k in range(2)]
-    wave = np.array([0.0, 0.0, misfit])
-    off = [Cloud(c.points + wave * np.sin(8 * c.points[..., :1]), c.model) for c in clouds]
-    assert cloud_noise(TOLD, off) is TOLD
+@pytest.mark.parametrize("sd", [0.001, 0.003, 0.01])
+@pytest.mark.parametrize("misfit", [0.0, 0.01, 0.05])
+def test_points_that_are_off_by_themselves_stay_so_whatever_the_model_misses(misfit: float, sd: float) -> None:
+    white = replace(TOLD, sd=sd)
+    wave, clouds = np.array([0.0, 0.0, misfit]), [seen(white, k) for k in range(2)]
+    off = [Cloud(c.points, c.off + wave * np.sin(8 * c.points[..., :1])) for c in clouds]
+    assert cloud_noise(white, off) is white
+
+
+def test_noise_that_is_told_too_large_is_not_shared() -> None:
+    assert cloud_noise(TOLD, [seen(replace(TOLD, sd=0.6 * SD), k) for k in range(2)]) is TOLD
 
 
 def test_a_few_points_say_nothing_of_their_neighbours() -> None:
     assert cloud_noise(TOLD, [seen(shared(0.9, 0.05, 0.9), 0, 5)]) is TOLD
     nothing = seen(TOLD, 0)
-    assert cloud_noise(TOLD, [Cloud(np.full_like(nothing.points, np.nan), nothing.model)]) is TOLD
+    gone = np.full_like(nothing.points, np.nan)
+    assert cloud_noise(TOLD, [Cloud(gone, gone)]) is TOLD
 
 
 def test_a_parameter_is_told_as_well_as_is_said() -> None:
