@@ -102,6 +102,12 @@ def _models(found: Findings) -> list[dict[str, Any]]:
     ]
 
 
+def _together(found: Findings, e: Evidence) -> dict[str, Any] | None:
+    """Two effects that explain most where nothing is named, and others that explain as much."""
+    told = [{"effects": list(p.names), "explained": e.explained(p.both)} for p in found.together]
+    return {**told[0], "alike": told[1:]} if told else None
+
+
 def _rest(found: Findings, joint: Evidence, work: Work) -> str | None:
     """What is known of a misfit that stays with all that was named in the model.
 
@@ -159,9 +165,7 @@ def _result(
         "effects": list(found.effects),
         "further": list(found.further),
         "rest": _rest(found, joint, work),
-        "together": None
-        if found.together is None
-        else {"effects": list(found.together.names), "explained": e.explained(found.together.both)},
+        "together": _together(found, e),
         "candidates": rows,
         "error": {
             "noise": work.fit.noise.sd,

@@ -69,6 +69,11 @@ def promising_pairs(work: Work, stage: Stage) -> list[Pair]:
     return sorted(found, key=_left)
 
 
+def level_with_first(stage: Stage, pairs: Sequence[Pair]) -> tuple[Pair, ...]:
+    """The first of ``pairs``, and those that the data cannot tell from it."""
+    return tuple(p for p in pairs if p is pairs[0] or stage.evidence.level(p.both, pairs[0].both))
+
+
 def partners(stage: Stage, lead: str, count: int) -> list[str]:
     """The ``count`` candidates that promise most beside the lead in a linear model of what is left without both."""
     look = stage.looks[lead]

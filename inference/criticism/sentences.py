@@ -126,7 +126,10 @@ def _together(two: dict[str, Any] | None, best: dict[str, Any]) -> str:
     if two is None or two["explained"] < best["explained"] + _WORTH_TELLING:
         return ""
     but = "not enough for a name" if two["explained"] < EXPLAINS else "these data do not tell that it is these two"
-    return f" Together {' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}."
+    others = [f"{' and '.join(p['effects'])} ({100 * p['explained']:.0f} %)" for p in two["alike"]]
+    as_much = f": {', '.join(others[:3])} may be it as well" if others else ""
+    told = f"{' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}"
+    return f" Together {told}{as_much}."
 
 
 def _is_a_part(best: dict[str, Any]) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from .candidate import Candidate
-from .pairs import Pair, partners, promising_pairs
+from .pairs import Pair, level_with_first, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
 from .verdict import (
@@ -57,7 +57,8 @@ class Findings:
             ones, an effect that is missing whichever of them it is.
         rest: what was decided with the named ones in the model; None where that was not looked into.
         rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
-        together: the two effects that left least where nothing was named, if any were tried.
+        together: where nothing was named, the two effects that left least, and others that the data cannot tell from
+            them; none if no two were tried.
         doubt: of the one effect that had a name before it was looked at where it fits.
     """
 
@@ -69,7 +70,7 @@ class Findings:
     further: tuple[str, ...] = ()
     rest: Decision | None = None
     rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
-    together: Pair | None = None
+    together: tuple[Pair, ...] = ()
     doubt: Doubt | None = None
 
 
@@ -84,7 +85,7 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     if (verdict == "none" or _outdone(first, pairs)) and (pair := _pair(work, names, first, pairs)):
         return pair
     if verdict == "none":
-        return Findings("none", (), first, first, _nearest(first), together=pairs[0] if pairs else None)
+        return Findings("none", (), first, first, _nearest(first), together=level_with_first(first, pairs))
     found = Findings(verdict, first.decision.effects, first, first, first.chosen)
     if verdict == "tied":
         return _with_another(work, names, found, pairs) or found

@@ -10,7 +10,7 @@ from test_verdict import candidate, evidence
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.linear import Look, look_at
-from muslin.inference.criticism.pairs import partners, promising_pairs
+from muslin.inference.criticism.pairs import level_with_first, partners, promising_pairs
 from muslin.inference.criticism.stage import Stage
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.discrepancy import NONE
@@ -120,6 +120,13 @@ def test_without_a_candidate_that_explains_anything_there_is_no_pair(stage: Stag
     nothing = [replace(c, fit=replace(c.fit, white=stage.plain.white)) for c in stage.evidence.candidates]
     idle = replace(stage, evidence=replace(stage.evidence, candidates=tuple(nothing)))
     assert promising_pairs(Bench(), idle) == []  # type: ignore[arg-type]
+
+
+def test_pairs_that_the_data_cannot_tell_are_told_of(misfit: Stage) -> None:
+    first, far = (promising_pairs(Bench(), misfit)[k] for k in (0, -1))  # type: ignore[arg-type]
+    near = replace(far, both=replace(first.both, name="wind"))
+    assert level_with_first(misfit, [first, near, far]) == (first, near)
+    assert level_with_first(misfit, []) == ()
 
 
 def test_partners_are_those_that_promise_most_beside_the_lead(stage: Stage) -> None:

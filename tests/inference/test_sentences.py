@@ -78,9 +78,12 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
     def told(two: dict[str, Any] | None) -> str:
         return _verdict(none | {"together": two}, {})
 
-    pair = {"effects": ["drag", "added-mass"], "explained": 0.81}
+    pair = {"effects": ["drag", "added-mass"], "explained": 0.81, "alike": []}
     assert "Together drag and added-mass explain 81 %, which is more, but these data do not tell" in told(pair)
     assert "explain 76 %, which is more, but not enough for a name." in told(pair | {"explained": 0.76})
+    as_good = [{"effects": ["wind", "added-mass"], "explained": 0.79}, {"effects": ["lag", "hem"], "explained": 0.78}]
+    alike = told(pair | {"alike": as_good})
+    assert "these two: wind and added-mass (79 %), lag and hem (78 %) may be it as well." in alike
     assert "Together" not in told(pair | {"explained": 0.7})
     assert "Together" not in told(None)
 
