@@ -11,19 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from ..core.arrays import BoolArray, FloatArray, IntArray
 from .noise import Noise, SharedNoise
+from .patches import scatter, some_frames
 
-#: Frames of a recording that are looked at, at most, and points of each.
-_FRAMES, _POINTS = 40, 400
+#: Points of a frame that are looked at, at most.
+_POINTS = 400
 #: Pairs of points are sorted by distance into so many classes, up to this part of the cloud's extent; so many pairs a
 #: class needs before it says anything.
 _CLASSES, _FARTHEST, _PAIRS = 30, 0.6, 200
-#: Points that make a patch.
-_NEIGHBOURS = 20
 #: Correlation from frame to frame, at most; and the share of the noise below which nothing is called shared.
 _SLOWEST, _LEAST = 0.98, 0.2
 
@@ -55,7 +53,8 @@ def cloud_noise(noise: Noise, clouds: Sequence[Cloud]) -> Noise:
         return noise
     # what is shared is seen across the surface alone, one of the coordinates, as the nearest place follows along it
     seen = clouds[0].off.shape[2] * same.product[0] / noise.sd**2
-    share = float(min(1.0 - _scatter(clouds) / max(_scatter(clouds, noise.sd, rng), 1e-300), seen))
+    points = [c.points for c in clouds]
+    share = float(min(1.0 - scatter(points) / max(scatter(points, noise.sd, rng), 1e-300), seen))
     if share < _LEAST:
         return noise
     reach = same.reach(width)
@@ -85,7 +84,7 @@ def _alike(clouds: Sequence[Cloud], width: float, lag: int) -> _Alike:
     """Of points of one frame, or of one and the ``lag``-th after it."""
     total, pairs = np.zeros(_CLASSES), np.zeros(_CLASSES)
     for cloud in clouds:
-        for t in _frames(len(cloud.off) - lag):
+        for t in some_frames(len(cloud.off) - lag):
             here, there = _some(cloud.off[t]), _some(cloud.off[t + lag])
             if not len(here) or not len(there):
                 continue
@@ -100,11 +99,6 @@ def _alike(clouds: Sequence[Cloud], width: float, lag: int) -> _Alike:
     return _Alike(total / np.maximum(pairs, 1.0), pairs >= _PAIRS)
 
 
-def _frames(count: int) -> IntArray:
-    """Of so many frames those that are looked at."""
-    return np.unique(np.linspace(0, count - 1, min(count, _FRAMES)).astype(int))
-
-
 def _some(places: FloatArray) -> IntArray:
     """Numbers of points that were seen, some of them if there are many."""
     seen = np.flatnonzero(np.isfinite(places).all(axis=1))
@@ -115,35 +109,6 @@ def _extent(points: FloatArray) -> float:
     """How far a cloud reaches, in the median over its frames [unit]."""
     seen = (p[np.isfinite(p).all(axis=1)] for p in points)
     return float(np.median([np.ptp(p, axis=0).max() for p in seen if len(p)] or [0.0]))
-
-
-def _scatter(clouds: Sequence[Cloud], sd: float = 0.0, rng: np.random.Generator | None = None) -> float:
-    """Variance of points about the plane through their neighbours, the median over all points [unit2].
-
-    What a fold adds, or a second layer, is in few of them. Given ``rng``, not that of the clouds as they are, but laid
-    flat patch by patch and with white noise ``sd`` of every coordinate.
-    """
-    found = []
-    for cloud in clouds:
-        for frame in cloud.points[_frames(len(cloud.points))]:
-            seen = frame[np.isfinite(frame).all(axis=1)]
-            if len(seen) <= _NEIGHBOURS:
-                continue
-            variance, normal, middle = _planes(seen)
-            if rng is not None:
-                height = np.sum((seen - middle) * normal, axis=1)
-                variance = _planes(seen - height[:, None] * normal + sd * rng.normal(size=seen.shape))[0]
-            found.append(variance)
-    return float(np.median(np.concatenate(found))) if found else 0.0
-
-
-def _planes(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Of the patch about every point ``(N, A)``: variance across its plane ``(N,)``, the plane's normal, the middle."""
-    patches = points[cKDTree(points).query(points, _NEIGHBOURS)[1]]
-    middle = patches.mean(axis=1)
-    patches -= middle[:, None]
-    variances, axes = np.linalg.eigh(np.swapaxes(patches, 1, 2) @ patches / _NEIGHBOURS)
-    return variances[:, 0], axes[:, :, 0], middle
 
 
 def _worth(points: FloatArray, share: float, reach: float, ar1: float) -> tuple[float, float]:

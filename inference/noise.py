@@ -12,11 +12,14 @@ from ..core.interpolation import interpolate
 from ..core.measurement import Recording, repeats
 from ..core.study import Problem
 from .noise_draws import ar1_noise, smooth_noise
+from .patches import patch_noise
 
 #: Largest clock offset between repeats that is looked for, this [s] or so many frames if they are longer.
 _LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
 #: No noise of repeats is taken to be more correlated from frame to frame.
 _SLOWEST = 0.98
+#: Where the noise of clouds is from, and what that does not tell.
+_CLOUDS = "how patches of the clouds scatter; if cameras do not agree, which that does not show, give [noise] sd"
 
 
 @dataclass(frozen=True)
@@ -93,7 +96,7 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
 
     Told by the study, else from repeats of the same motion, held-out takes among them (their difference
     is pure noise, take to take variation of the object included), else from the fourth difference in
-    time, to which a smooth motion gives next to nothing.
+    time, to which a smooth motion gives next to nothing; of clouds from how their patches scatter.
 
     Raises:
         InputError: recordings too short or too sparse for an estimate.
@@ -112,6 +115,8 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
         independent = count.sum() * min(1.0, takes / 2 / len(pairs)) * (1 - correlation) / (1 + correlation)
         source = f"{takes} takes that are repeats"
         error = float(1 / np.sqrt(2 * max(independent, 1.0)))
+    elif (clouds := [problem.recordings[n].series.points for n in problem.clouds]) and len(clouds) == len(recordings):
+        sd, correlation, source, error = patch_noise(clouds), 0.0, _CLOUDS, 0.1
     else:
         corresponding = [r.series.points for r in recordings if r.series.correspondence]
         rough = np.concatenate([fourth_differences(p) for p in corresponding] or [np.zeros(0)])

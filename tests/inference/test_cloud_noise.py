@@ -15,6 +15,7 @@ from muslin.inference.criticism.comparing.replicates import NoiseDraws
 from muslin.inference.noise import Noise, SharedNoise
 from muslin.inference.noise_draws import smooth_noise
 from muslin.inference.observe import Observer
+from muslin.inference.patches import patch_noise
 from muslin.inference.residuals import Offsets, nearest
 
 SD = 0.01
@@ -138,3 +139,13 @@ def test_noise_may_be_stronger_than_it_is_taken_for() -> None:
     observer = Observer([recording], TOLD, Offsets())
     weak, strong = observer.observe([np.zeros((2, len(TIME), 40, 3))], np.arange(2), 0, np.array([0.5, 2.0]))[0]
     assert weak.std() == pytest.approx(0.5 * SD, rel=0.05) and strong.std() == pytest.approx(2.0 * SD, rel=0.05)
+
+
+@pytest.mark.parametrize("sd", [0.003, 0.01])
+def test_white_noise_of_clouds_is_told_by_how_patches_scatter(sd: float) -> None:
+    clouds = [seen(replace(TOLD, sd=sd), k).points for k in range(2)]
+    assert patch_noise(clouds) == pytest.approx(sd, rel=0.1)
+    assert patch_noise([clouds[0][:, :15]]) == 0.0
+    flat = np.zeros((3, 40, 3))
+    flat[..., :2] = np.random.default_rng(0).random((3, 40, 2))
+    assert patch_noise([flat]) < 1e-9

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from small import TRUTH, small_measurement, write_study
 
+from muslin.core.errors import InputError
 from muslin.core.measurement import Measurement
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
-from muslin.inference.noise import Noise, SharedNoise
+from muslin.inference.noise import Noise, SharedNoise, estimate_noise
 from muslin.inference.sequential.fitting import _takes, fit
 
 SHARED = Noise(0.006, 0.0, "test", "m", 0.02, shared=SharedNoise(0.95, 0.06, 0.9, 1.0))
@@ -64,3 +65,16 @@ def test_only_places_of_the_surface_may_be_hidden(tmp_path: Path) -> None:
     draws = [np.zeros((2, *r.series.points.shape[:1], 1000, 3)) for r in clean.recordings[:2]]
     seen = _takes(study, SHARED).observe(draws, np.arange(2), 0)
     assert [s.shape[1:] for s in seen] == [r.series.points.shape for r in clean.recordings[:2]]
+
+
+def test_the_noise_of_clouds_need_not_be_told(tmp_path: Path) -> None:
+    clean = small_measurement(noise=0.0)
+    marked = Study.load(write_study(tmp_path / "marked", clean), workers=0)
+    study = Study.load(write_study(tmp_path / "cloud", half_seen(clean, marked, 0)), workers=0)
+    with pytest.raises(InputError, match="unordered points"):  # named keypoints, of which no patch can be made
+        estimate_noise(study.problem, None)
+    study.config.scenario.markers = "surface"
+    study.save()
+    found = estimate_noise(Study.load(study.path, workers=0).problem, None)
+    assert found.sd == pytest.approx(SHARED.sd * (1 - SHARED.shared.share) ** 0.5, rel=0.5)  # type: ignore[union-attr]
+    assert "patches of the clouds scatter" in found.source and found.shared is None
