@@ -68,6 +68,14 @@ def test_after_everything(tmp_path: Path) -> None:
     assert (tmp_path / "cloth.report.html").stat().st_size < 3e6
 
 
+def test_pieces_that_were_fitted_are_told_of(tmp_path: Path) -> None:
+    study = make_study(tmp_path, "fit", "compare")
+    told = "Fitted recordings are predicted in pieces (5 of each, in the mean)"
+    assert told not in page_of(study).text
+    study.results("r+")["compare"].attrs["in_pieces"] = told
+    assert told in page_of(study).text
+
+
 def test_a_second_study_is_the_after(tmp_path: Path) -> None:
     study = make_study(tmp_path, "fit", "compare", "diagnose")
     page = page_of(study, make_study(tmp_path, "fit", "compare", drag=True))

@@ -41,7 +41,9 @@ def test_more_recordings_and_objects_that_are_quick_to_simulate_get_more_simulat
 def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pytest.MonkeyPatch, pieces: float) -> None:
     monkeypatch.setattr(work, "offsets_of", lambda study: None)
     asked = SimpleNamespace(config=SimpleNamespace(diagnose=SimpleNamespace(draws=4, simulations=1000)))
-    problem = SimpleNamespace(space=SimpleNamespace(to_unit=lambda samples: samples), pieces=pieces)
+    problem = SimpleNamespace(
+        space=SimpleNamespace(to_unit=lambda samples: samples), pieces=pieces, told_as=lambda n: round(n / pieces)
+    )
     fit = SimpleNamespace(samples=np.zeros((9, 1)), derivative_step=1e-3)
     spent = SimpleNamespace(count=int(400 * pieces))
     search = Work(asked, problem, spent, fit)  # type: ignore[arg-type]
