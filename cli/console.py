@@ -4,6 +4,8 @@ import math
 import shlex
 import sys
 import time
+from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import TextIO
 
@@ -23,6 +25,11 @@ def say(text: str) -> None:
 def command(*parts: object) -> str:
     """A command line that a shell takes as it is printed, whatever a path has in it."""
     return shlex.join(["muslin", *(str(p) for p in parts)])
+
+
+def add_command(study: Path, effects: Sequence[str]) -> str:
+    """The command line that adds ``effects`` to a study."""
+    return command("add", ",".join(effects), study)
 
 
 def next_step(*commands: str, note: str = "") -> None:

@@ -8,8 +8,7 @@ import typer
 from ..core.errors import InputError
 from ..core.registry import REGISTRY
 from ..core.study import Study
-from .adding import add_command, with_effects
-from .console import ProgressView, command, next_step, say
+from .console import ProgressView, add_command, command, next_step, say
 from .output import check_apart, check_output, check_result, write_json
 
 StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file, made with muslin new.")]
@@ -125,8 +124,8 @@ def add(
         raise InputError(f"name an effect and a study, or a law file and a study; got {effect!r} alone")
     source = Path(effect) if study is None else study
     names = [name.strip() for name in effect.split(",")] if law is None else ["law"]
-    target = output or with_effects(source, names)
     loaded = Study.load(source)
+    target = output or loaded.path_with(names)
     check_apart(target, loaded)
     check_output(target, force)
     if law is not None and target.resolve() == law.resolve():

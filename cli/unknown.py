@@ -46,5 +46,4 @@ def unknown(
     elif json_file is None:
         next_step(command("unknown", study, "--json", study.with_name(f"{study.stem}-law.json")))
     else:
-        output = study.with_name(f"{study.stem}-with-law.toml")
-        next_step(command("add", "--law", json_file, study, "-o", output))
+        next_step(command("add", "--law", json_file, study))

@@ -54,7 +54,8 @@ def cloud_noise(noise: Noise, clouds: Sequence[Cloud]) -> Noise:
     # what is shared is seen across the surface alone, one of the coordinates, as the nearest place follows along it
     seen = clouds[0].off.shape[2] * same.product[0] / noise.sd**2
     points = [c.points for c in clouds]
-    share = float(min(1.0 - scatter(points) / max(scatter(points, noise.sd, rng), 1e-300), seen))
+    alone = scatter(points, noise.sd, rng)
+    share = float(min(1.0 - scatter(points) / alone, seen)) if alone > 0.0 else 0.0
     if share < _LEAST:
         return noise
     reach = same.reach(width)

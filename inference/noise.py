@@ -115,8 +115,8 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
         independent = count.sum() * min(1.0, takes / 2 / len(pairs)) * (1 - correlation) / (1 + correlation)
         source = f"{takes} takes that are repeats"
         error = float(1 / np.sqrt(2 * max(independent, 1.0)))
-    elif (clouds := [problem.recordings[n].series.points for n in problem.clouds]) and len(clouds) == len(recordings):
-        sd, correlation, source, error = patch_noise(clouds), 0.0, _CLOUDS, 0.1
+    elif len(problem.clouds) == len(recordings) and (sd := patch_noise([r.series.points for r in recordings])) > 0:
+        correlation, source, error = 0.0, _CLOUDS, 0.1
     else:
         corresponding = [r.series.points for r in recordings if r.series.correspondence]
         rough = np.concatenate([fourth_differences(p) for p in corresponding] or [np.zeros(0)])

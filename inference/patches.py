@@ -29,13 +29,13 @@ def scatter(clouds: Sequence[FloatArray], sd: float = 0.0, rng: np.random.Genera
         sd, rng: of noise that is put on flat patches.
 
     Returns:
-        Zero if no frame has enough points.
+        Zero if no frame has enough points, or they are in a picture, where a patch has no way off it.
     """
     found = []
     for points in clouds:
         for frame in points[some_frames(len(points))]:
             seen = frame[np.isfinite(frame).all(axis=1)]
-            if len(seen) <= _NEIGHBOURS:
+            if len(seen) <= _NEIGHBOURS or seen.shape[1] < 3:
                 continue
             variance, normal, middle = _planes(seen)
             if rng is not None:

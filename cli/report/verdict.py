@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ...core.errors import MuslinError
 from ...core.study.objects import object_of
-from ..adding import add_command
+from ..console import add_command
 from .findings import Findings, number
 from .words import errors, fall, length, sentence, words
 

@@ -218,7 +218,7 @@ class Study:
         for name in names:
             self._check_added(name, config.effects, coefficients is not None)
             config.effects[name] = dict(coefficients or {})
-        path = Path(output) if output else self.path.with_name(f"{self.path.stem}-with-{'-and-'.join(names)}.toml")
+        path = Path(output) if output else self.path_with(names)
         if path.exists() and not overwrite:
             raise InputError(f"{path} exists already; name another file, or say overwrite=True (--force)")
         if config.study.results is not None:
@@ -230,6 +230,10 @@ class Study:
         study.problem  # noqa: B018  an effect that cannot act here is refused before anything is written
         study.save()
         return study
+
+    def path_with(self, effects: Sequence[str]) -> Path:
+        """The study file with ``effects`` added, where nobody names one."""
+        return self.path.with_name(f"{self.path.stem}-with-{'-and-'.join(effects)}.toml")
 
     def _check_added(self, name: str, there: Mapping[str, Any], told: bool) -> None:
         """Refuse an effect that is among those ``there``, or of which must be ``told`` what to infer."""

@@ -70,6 +70,10 @@ def test_noise_that_is_told_too_large_is_not_shared() -> None:
 
 def test_a_few_points_say_nothing_of_their_neighbours() -> None:
     assert cloud_noise(TOLD, [seen(shared(0.9, 0.05, 0.9), 0, 5)]) is TOLD
+    sparse = [seen(shared(0.9, 0.05, 0.9), k, 20) for k in range(80)]  # pairs enough, but no patch
+    assert cloud_noise(TOLD, sparse) is TOLD
+    flat = [Cloud(c.points[..., :2], c.off[..., :2]) for c in (seen(shared(0.9, 0.05, 0.9), k) for k in range(2))]
+    assert cloud_noise(TOLD, flat) is TOLD  # in a picture
     nothing = seen(TOLD, 0)
     gone = np.full_like(nothing.points, np.nan)
     assert cloud_noise(TOLD, [Cloud(gone, gone)]) is TOLD
