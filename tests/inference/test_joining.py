@@ -1,9 +1,12 @@
 """Pieces of a recording are told of as the recording."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import pytest
 from linear_study import SD, TIME, fitted, measured
+from next_world import cut_in_half, register, rope_study
 
 from muslin.core.series import PointSeries
 from muslin.inference.criticism.comparing.groups import partitions
@@ -66,3 +69,16 @@ def test_what_was_not_cut_stays_as_it_is() -> None:
     take = whole()
     assert rejoined([take], {})[0] is take
     assert pieces_sentence(1.0) == "" and "5 of each" in pieces_sentence(5.0)
+
+
+def test_a_comparison_tells_of_the_recording_and_keeps_it_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    register(monkeypatch)
+    study = rope_study(tmp_path)
+    frames = len(study.problem.recordings["slow"].series.time)
+    cut_in_half(study)
+    found = study.compare()
+    assert [r.recording for r in found.rows] == ["slow"] and "(2 of each, in the mean)" in found.text()
+    kept = study.results()["compare"]
+    assert list(kept) == ["slow"] and kept["slow"]["error"].shape == (frames,)
