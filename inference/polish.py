@@ -25,6 +25,9 @@ TOLD_APART = 0.3
 #: How far derivatives are trusted at first, and the smallest steps before they are taken.
 NEARBY, COARSE = 0.02, 0.002
 
+#: Information of the uniform prior: a unit interval has the variance 1/12.
+_PRIOR = 12.0
+
 
 @dataclass(frozen=True, eq=False)
 class Polished(Found):
@@ -42,8 +45,10 @@ class Polished(Found):
 
     @property
     def widened(self) -> FloatArray:
-        """The covariance ``(D, D)`` to be told: what is left beyond noise makes the best fit that much less certain."""
-        return np.asarray(self.covariance * max(1.0, self.rss / self.count))
+        """The covariance ``(D, D)`` to be told: what is left beyond noise makes the data tell that much less."""
+        left = max(1.0, self.rss / self.count)
+        information = np.linalg.inv(self.covariance) + (left - 1.0) * _PRIOR * np.eye(len(self.unit))
+        return np.asarray(left * np.linalg.inv(information), float)
 
 
 class Objective:
@@ -174,8 +179,7 @@ def polish(
         best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
         used += more + len(start)
         rested = before - best.rss < CHANCE * enough * best.rss  # so near that the derivatives hold
-    # The uniform prior of a unit interval has variance 1/12: it bounds what the data leave open.
-    information = jacobian.T @ jacobian + 12.0 * np.eye(len(start))
+    information = jacobian.T @ jacobian + _PRIOR * np.eye(len(start))  # the prior bounds what the data leave open
     covariance = np.asarray(np.linalg.inv(information), float)
     return Polished(best.unit, best.white, jacobian, covariance, count, rested)
 

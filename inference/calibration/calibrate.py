@@ -10,11 +10,11 @@ from ...core.estimator import Posterior
 from ...core.rollout import Trajectory
 from ...core.store import read
 from ...core.study import Problem, SimulationPool, Study, Task
-from ..observe import Observer
 from ..posterior.files import fitted_posterior
 from ..sequential.draws import DrawStore
-from ..sequential.fitting import offsets_of
+from ..sequential.polishing import offsets_of, takes_of
 from ..sequential.result import FitResult, load_fit
+from ..sequential.span import Span
 from ..sequential.takes import Takes
 from ..sequential.training import make_estimator
 from .held_out import held_out_ranks
@@ -63,18 +63,19 @@ def calibrate(study: Study, simulations: int = 0, predictive: int = PREDICTIVE) 
             f"{study.path} was fitted with {group.attrs.get('engine')}, but now there is "
             f"{problem.simulator.engine_version()}; run: muslin fit {study.path}"
         )
-    recordings = [problem.recordings[r] for r in problem.fit_on]
-    takes = Takes(Observer(recordings, fit.noise, offsets_of(study), problem.clouds), problem.scenarios)
+    takes = takes_of(study, fit.noise, fit.left)
     store = DrawStore(study, problem, takes.simulated, table.rounds * table.draws)
     theta, points, numbers = store.read(fit.rounds * table.draws)
     weights = read(group, "log_weights") if "log_weights" in group else None
-    seen = takes.observe(points, numbers, study.config.study.seed)
+    span = Span(takes, points, weights)
+    seen = span(takes.observe(points, numbers, study.config.study.seed))
     rng = np.random.default_rng([study.config.study.seed, 6007])
     notes = [] if fit.failed == 0 else [f"{fit.failed} draws could not be simulated and are not among the cases"]
     with study.pool(problem) as pool:
         if simulations:
             posterior = fitted_posterior(study)
             fresh, flawed = _fresh(study, pool, takes, posterior, simulations, rng)
+            flawed = span(flawed)
             study.progress(f"training {table.name}", 0, 0)
             estimator = make_estimator(study, takes.correspondence)
             estimator.fit(theta, seen, log_weights=weights, seed=study.config.study.seed + fit.rounds - 1)

@@ -17,7 +17,7 @@ from ..discrepancy import Discrepancy
 from ..noise import Noise
 from ..polish import Objective
 from ..residuals import residual, rms
-from ..sequential.fitting import offsets_of
+from ..sequential.polishing import offsets_of
 from ..sequential.result import load_fit
 from .comparing.adequacy import adequacy
 from .comparing.excess import excess, sentence

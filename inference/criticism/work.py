@@ -13,7 +13,7 @@ from ..polish import Objective, Polished, polish
 from ..residuals import Residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
-from ..sequential.fitting import offsets_of
+from ..sequential.polishing import offsets_of
 from ..sequential.result import FitResult
 from .candidate import Candidate, root_mean_square
 from .held_out import HeldOut, held_out_residuals

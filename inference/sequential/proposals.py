@@ -9,6 +9,7 @@ from ...core.arrays import BoolArray, FloatArray
 from ...core.estimator import Posterior
 from ..posterior.mixture import MixturePosterior
 from .division import around, divide
+from .ellipsoid import Ellipsoid
 from .region import Region
 from .success import Success
 
@@ -16,6 +17,8 @@ Kind = Literal["truncated", "posterior", "gaussian"]
 
 #: Share of every later round's proposal that is still the prior: what an early posterior has missed is found again.
 DEFENSIVE = 0.2
+#: Draws of a posterior that an ellipsoid is put around.
+ELLIPSOID_DRAWS = 4000
 #: Draws that measure how often a proposal is accepted by the success model.
 _DRAWS = 20_000
 
@@ -38,20 +41,26 @@ class Proposal:
         core: where the posterior is.
         success: None where nothing is known of failures.
         rng: of what measures the mean.
+        defensive: share of the prior.
     """
 
-    def __init__(self, core: Density, success: Success | None, rng: np.random.Generator) -> None:
-        self._core, self._success, self._log_mean = core, success, 0.0
+    def __init__(
+        self, core: Density, success: Success | None, rng: np.random.Generator, defensive: float = DEFENSIVE
+    ) -> None:
+        self._core, self._success, self._defensive, self._log_mean = core, success, defensive, 0.0
         if success is not None:
             self._log_mean = float(np.log(success.probability(self._plain(_DRAWS, rng)).mean()))
 
     def plain(self, unit: FloatArray) -> FloatArray:
         """Log density ``(N,)`` before it is thinned."""
-        return np.asarray(np.logaddexp(np.log(DEFENSIVE), np.log(1 - DEFENSIVE) + self._core.log_prob(unit)))
+        if not self._defensive:
+            return self._core.log_prob(unit)
+        rest = np.log(1 - self._defensive) + self._core.log_prob(unit)
+        return np.asarray(np.logaddexp(np.log(self._defensive), rest))
 
     def _plain(self, count: int, rng: np.random.Generator) -> FloatArray:
         core = self._core.sample(count, rng)
-        take = rng.random(count) >= DEFENSIVE
+        take = rng.random(count) >= self._defensive
         return np.asarray(np.where(take[:, None], core, rng.random(core.shape)))
 
     def sample(self, count: int, rng: np.random.Generator) -> FloatArray:
@@ -82,7 +91,10 @@ class Proposals:
     - ``"truncated"``: t is the latest proposal itself, uniform on the region that holds the latest posterior and on
       the rest of the box. All draws weigh about the same, and what is learned is the posterior as it is within the
       region, up to the mass that t has taken from outside: a thousandth by the latest posterior's own account, and
-      where that was wrong the next region grows there;
+      where that was wrong the next region grows there. Where the region is an ellipsoid that was held against the
+      model (:mod:`.narrowing`) nothing is drawn outside, and draws there count no more: few draws that lie far off
+      tell a regression more than many near ones, and of another place. Later rounds draw from an ellipsoid around the
+      latest posterior;
     - ``"posterior"``: t is the prior, and draws come from the latest posterior itself;
     - ``"gaussian"``: t is a Gaussian around the latest posterior, and the learned mixture is divided by it; where
       that leaves the positive definite cone it is learned anew with t the prior, which is also taken where the
@@ -98,28 +110,34 @@ class Proposals:
         self.kind, self.dim, self.seed = kind, dim, seed
         self._later: list[Proposal] = []
         self._divisor: MixturePosterior | None = None
+        self.region: Ellipsoid | None = None  # that the latest round draws from, if it does
 
     def draw(self, count: int) -> FloatArray:
         """``(count, D)`` draws of the next round; the first round's come from the prior."""
         rng = np.random.default_rng([self.seed, len(self._later)])
         return self._later[-1].sample(count, rng) if self._later else rng.random((count, self.dim))
 
-    def add(self, latest: Posterior, theta: FloatArray, failed: BoolArray) -> None:
+    def add(self, latest: Posterior, theta: FloatArray, failed: BoolArray, within: Ellipsoid | None = None) -> None:
         """A round has ended: the next one's draws come from about its posterior.
 
         Args:
             latest: posterior of the round.
             theta: of all draws tried so far ``(N, D)``.
             failed: which of them failed ``(N,)``.
+            within: what is known to hold the posterior, for truncated proposals.
         """
         rng = np.random.default_rng([self.seed, len(self._later), 104_729])
         core: Density = latest
         if self.kind == "truncated":
-            core = Region(latest, rng)
+            if within is None and self.region is not None:
+                within = Ellipsoid.around(latest.sample(ELLIPSOID_DRAWS, rng), rng)
+            core = Region(latest, rng) if within is None else within
+            self.region = within
         elif self.kind == "gaussian":
             core = around(latest, rng)
             self._divisor = core if isinstance(latest, MixturePosterior) else None
-        self._later.append(Proposal(core, Success.learned(theta, failed), rng))
+        share = DEFENSIVE if self.region is None else 0.0
+        self._later.append(Proposal(core, Success.learned(theta, failed), rng, share))
 
     def log_weights(self, theta: FloatArray, *, under_prior: bool = False) -> FloatArray | None:
         """log t / p~ of draws ``(N, D)``; None in the first round, whose draws follow the prior.
@@ -137,6 +155,11 @@ class Proposals:
         if self.kind == "truncated" and not under_prior:
             return np.asarray(self._later[-1].plain(theta) - mixture)
         return np.asarray(-mixture)
+
+    def counting(self, theta: FloatArray) -> int:
+        """How many of the draws ``(N, D)`` weigh anything."""
+        log_weights = self.log_weights(theta)
+        return len(theta) if log_weights is None else int(np.isfinite(log_weights).sum())
 
     def corrected(self, learned: Posterior) -> Posterior | None:
         """The posterior under the prior; None where it must be learned anew with the weights of the prior."""

@@ -40,6 +40,8 @@ class FitResult:
         failed: draws that could not be simulated.
         seconds: of the run that finished the fit.
         derivative_step: of one-sided differences in the unit cube that suits this model; see :mod:`..roughness`.
+        left: squares that the best fit leaves, in parts of what noise leaves. What is above one counts as noise in
+            ``sd`` and in the posterior.
     """
 
     names: tuple[str, ...]
@@ -56,6 +58,7 @@ class FitResult:
     failed: int
     seconds: float
     derivative_step: float
+    left: float = 1.0
 
     def values(self) -> dict[str, float]:
         """The best fit by name."""
@@ -177,6 +180,7 @@ def load_fit(study: Study) -> FitResult:
             failed=int(a["failed"]),
             seconds=float(a["seconds"]),
             derivative_step=float(a["derivative_step"]),
+            left=float(a.get("left", 1.0)),
         )
 
 

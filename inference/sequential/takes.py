@@ -6,6 +6,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.scenario import Scenario
+from ..noise import Noise
 from ..observe import Observer
 
 #: Draws that are observed at a time; bounds the memory that sixteen takes need.
@@ -69,6 +70,15 @@ class Takes:
             each = [points[where[i]][rows] for i in range(len(where))]
             parts.append(self._together(self._observer.observe(each, numbers[rows], seed)))
         return [np.concatenate(p) for p in zip(*parts, strict=True)]
+
+    def clean(self, points: Sequence[FloatArray]) -> list[FloatArray]:
+        """Clean draws, ``(N, T, P, A)`` a group, without what no take of the motion has measured."""
+        return [np.where(unmeasured, 0.0, p) for unmeasured, p in zip(self._unmeasured, points, strict=True)]
+
+    @property
+    def noise(self) -> Noise:
+        """That draws are given."""
+        return self._observer.noise
 
     def measured(self) -> list[FloatArray]:
         """The real thing in the same form, ``(T, P, A)`` a group."""

@@ -7,6 +7,7 @@ from ...core.registry import REGISTRY, check_options
 from ...core.study import Study
 from ..calibration.warn import calibration_warnings
 from .proposals import Proposals
+from .span import Span
 from .takes import Takes
 
 
@@ -38,11 +39,12 @@ class Learner:
 
     Args:
         study: whose ``[estimator]``.
-        takes: what is seen of a draw, and what was measured.
     """
 
-    def __init__(self, study: Study, takes: Takes) -> None:
-        self._study, self._takes = study, takes
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._correspondence: list[bool] = []
+        self._measured: list[FloatArray] = []  # as the estimator sees it
         self.redone = 0  # rounds that were learned anew, after a division that gave no density
         self.estimator: PosteriorEstimator | None = None
         # parameters, what was seen, and log weights of the draws of the last training
@@ -54,20 +56,28 @@ class Learner:
         return None if self.trained_on is None else self.trained_on[2]
 
     def learn(
-        self, theta: FloatArray, points: list[FloatArray], numbers: IntArray, proposals: Proposals, round_number: int
+        self,
+        takes: Takes,
+        theta: FloatArray,
+        points: list[FloatArray],
+        numbers: IntArray,
+        proposals: Proposals,
+        round_number: int,
     ) -> Posterior:
         """The posterior given the measurement, under the prior.
 
         Args:
+            takes: what is seen of a draw, and what was measured.
             theta: whole draws ``(N, D)``, in the unit cube.
             points: of the recordings that are simulated, clean, ``(N, T, P, A)``.
             numbers: of the draws ``(N,)``.
             proposals: of all rounds so far.
             round_number: from zero.
         """
-        seed = self._study.config.study.seed
-        seen = self._takes.observe(points, numbers, seed)
-        learned = self._train(theta, seen, proposals.log_weights(theta), seed + round_number)
+        seed, log_weights = self._study.config.study.seed, proposals.log_weights(theta)
+        span, self._correspondence = Span(takes, points, log_weights), takes.correspondence
+        seen, self._measured = span(takes.observe(points, numbers, seed)), span(takes.measured())
+        learned = self._train(theta, seen, log_weights, seed + round_number)
         posterior = proposals.corrected(learned)
         if posterior is None:
             self.redone += 1
@@ -78,11 +88,11 @@ class Learner:
     def _train(self, theta: FloatArray, seen: list[FloatArray], weights: FloatArray | None, seed: int) -> Posterior:
         self.estimator, self.trained_on = self.untrained(), (theta, seen, weights)
         self.estimator.fit(theta, seen, log_weights=weights, seed=seed)
-        return self.estimator.posterior(self._takes.measured())
+        return self.estimator.posterior(self._measured)
 
     def untrained(self) -> PosteriorEstimator:
         """The estimator of the study, without any training."""
-        return make_estimator(self._study, self._takes.correspondence)
+        return make_estimator(self._study, self._correspondence)
 
     def calibration_notes(self) -> list[str]:
         """Sentences for people where the last training gave posteriors that promise more than they hold."""

@@ -12,7 +12,8 @@ from muslin.core.measurement import Measurement
 from muslin.core.series import PointSeries
 from muslin.core.study import Study
 from muslin.inference.noise import Noise, SharedNoise, estimate_noise
-from muslin.inference.sequential.fitting import _takes, fit
+from muslin.inference.sequential.fitting import fit
+from muslin.inference.sequential.polishing import takes_of
 
 SHARED = Noise(0.006, 0.0, "test", "m", 0.02, shared=SharedNoise(0.95, 0.06, 0.9, 1.0))
 
@@ -63,7 +64,7 @@ def test_only_places_of_the_surface_may_be_hidden(tmp_path: Path) -> None:
     study = Study.load(study.path, workers=0)
     assert study.problem.clouds == ["near", "far", "other"]
     draws = [np.zeros((2, *r.series.points.shape[:1], 1000, 3)) for r in clean.recordings[:2]]
-    seen = _takes(study, SHARED).observe(draws, np.arange(2), 0)
+    seen = takes_of(study, SHARED).observe(draws, np.arange(2), 0)
     assert [s.shape[1:] for s in seen] == [r.series.points.shape for r in clean.recordings[:2]]
 
 

@@ -22,7 +22,7 @@ from muslin.core.store import read
 from muslin.core.study import Study, read_config, write_config
 from muslin.inference.criticism import compare as comparing
 from muslin.inference.polish import Objective, Polished
-from muslin.inference.sequential import fitting
+from muslin.inference.sequential import fitting, polishing
 from muslin.inference.sequential.only_one import only_one
 
 pytest.importorskip("mujoco")
@@ -74,10 +74,12 @@ def test_a_fit_tells_what_is_known_past_chance(small_study: Study, monkeypatch: 
         told.append(replace(best, covariance=4.0 * best.covariance, count=best.rss / 9.0))
         return told[-1]
 
-    monkeypatch.setattr(fitting, "seen_past_chance", past_chance)
+    monkeypatch.setattr(polishing, "seen_past_chance", past_chance)
     sd = small_study.fit().sd
     kept = read(small_study.step_results("fit"), "estimate_covariance")
-    np.testing.assert_allclose(kept, 9.0 * told[-1].covariance)
+    prior = 12.0 * np.eye(len(sd))
+    data = np.linalg.inv(told[-1].covariance) - prior
+    np.testing.assert_allclose(kept, np.linalg.inv(data / 9.0 + prior))
     np.testing.assert_allclose(sd, fitting.physical_sd(small_study.problem.space, told[-1].unit, kept))
 
 

@@ -11,7 +11,7 @@ from ....core.parameters import ParameterSpace
 from ....core.study import Problem, SimulationPool, Study
 from ...discrepancy import Discrepancy
 from ...polish import Objective, polish
-from ...sequential.fitting import offsets_of
+from ...sequential.polishing import offsets_of
 from ...sequential.result import FitResult
 
 #: Least-squares evaluations for a model that has to be refitted.

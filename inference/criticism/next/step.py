@@ -17,7 +17,7 @@ from ....core.registry import REGISTRY
 from ....core.store import put, read, storage_errors
 from ....core.study import Problem, Study
 from ....core.study.windows import joined
-from ...sequential.fitting import offsets_of
+from ...sequential.polishing import offsets_of
 from ...sequential.result import FitResult, load_fit
 from ..told import Told
 from ..verdict import MARGIN, SIGNIFICANT

@@ -18,7 +18,7 @@ from ...discrepancy import Discrepancy
 from ...polish import Objective
 from ...residuals import Offsets
 from ...roughness import check_repeatable, roughness
-from ...sequential.fitting import offsets_of
+from ...sequential.polishing import offsets_of
 from ...sequential.result import FitResult, load_fit
 from ..misfit import NEGLIGIBLE
 from ..told import Told

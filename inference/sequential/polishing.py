@@ -1,0 +1,159 @@
+"""The best fit of a study: found after the first round of draws, and anew where a later draw comes nearer."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.rollout import Trajectory
+from ...core.series import PointSeries
+from ...core.study import SimulationPool, Study, Task
+from ..cloud_noise import Cloud, cloud_noise
+from ..correlated_noise import correlated_noise
+from ..discrepancy import NONE, Discrepancy
+from ..noise import Noise
+from ..observe import Observer
+from ..polish import TOLD_APART, Objective, Polished, polish, polish_from
+from ..residuals import Offsets, residual
+from ..rough_curvature import seen_past_chance
+from ..roughness import roughness
+from ..secants import CHANCE
+from .draws import DrawStore
+from .ellipsoid import Ellipsoid
+from .narrowing import narrowed
+from .takes import Takes
+
+#: A search that has not come to rest goes on so often at most, or many parameters are still far from where they fit.
+GOES_ON = 3
+
+
+def offsets_of(study: Study) -> Offsets:
+    """Nuisance priors of a study."""
+    return Offsets(study.config.nuisance.clock_offset, study.config.nuisance.constant_offset)
+
+
+def takes_of(study: Study, noise: Noise, left: float = 1.0) -> Takes:
+    """The recordings that a study is fitted on, as an estimator sees them.
+
+    Args:
+        study: whose.
+        noise: of the measurement.
+        left: what the best fit leaves, in parts of what noise leaves. What is more than noise is given to draws as if
+            it were noise (a power posterior: Miller and Dunson, *Robust Bayesian inference via coarsening*, 2019): a
+            model that misses the data by much does not know its parameters by little.
+    """
+    problem = study.problem
+    recordings = [problem.recordings[r] for r in problem.fit_on]
+    larger = replace(noise, sd=noise.sd * max(1.0, left) ** 0.5)
+    return Takes(Observer(recordings, larger, offsets_of(study), problem.clouds), problem.scenarios)
+
+
+class Polishing:
+    """Least squares from the draws of a fit, and the noise as the best fit shows it.
+
+    Args:
+        study: that is fitted.
+        pool: where rollouts run.
+        store: of the draws.
+        noise: of the measurement, as it is known before.
+    """
+
+    def __init__(self, study: Study, pool: SimulationPool, store: DrawStore, noise: Noise) -> None:
+        self._study, self._pool, self._store = study, pool, store
+        self.noise, self.simulations = noise, 0
+        self._found: tuple[Objective, Polished] | None = None
+
+    @property
+    def best(self) -> Polished:
+        """The best fit."""
+        assert self._found is not None
+        return self._found[1]
+
+    @property
+    def objective(self) -> Objective:
+        """What that makes least."""
+        assert self._found is not None
+        return self._found[0]
+
+    @property
+    def takes(self) -> Takes:
+        """As an estimator is to see them after all that was found."""
+        return takes_of(self._study, self.noise, self.left)
+
+    @property
+    def left(self) -> float:
+        """What the best fit leaves, in parts of what noise leaves."""
+        return self.best.rss / self.best.count
+
+    def look(self, upto: int) -> FloatArray:
+        """Find the best fit with the first ``upto`` draws, and return these ``(N, D)``, the nearest first."""
+        before = self._pool.count
+        if self._found is None:
+            self._polish(upto, self._in_order(upto, NONE)[0][0])
+        else:
+            draws, least = self._in_order(upto, self.objective.discrepancy)
+            if self.best.rss - least > CHANCE * TOLD_APART * self.best.rss / self.best.count:
+                self._polish(upto, draws[0])
+        truer = self._truer()
+        if truer is not self.noise:
+            self._study.progress(f"polishing again: the noise is not what it was taken for ({truer.source})", 0, 0)
+            self.noise = truer
+            self._polish(upto, self.best.unit)
+        self.simulations += self._pool.count - before
+        return self._in_order(upto, self.objective.discrepancy)[0]
+
+    def narrowed(self, draws: FloatArray, rng: np.random.Generator) -> Ellipsoid | None:
+        """Where the posterior is, with ``draws (N, D)``, the nearest first; see :func:`~.narrowing.narrowed`."""
+        before = self._pool.count
+        found = narrowed(self.objective, self.best, draws, rng)
+        self.simulations += self._pool.count - before
+        return found
+
+    def _polish(self, upto: int, near: FloatArray) -> None:
+        """From ``near (D,)``, and where that leaves a misfit from the nearest draws."""
+        problem, offsets = self._study.problem, offsets_of(self._study)
+        space, names = problem.space, problem.fit_on
+        # what cannot be repeated there must not lead the fit
+        discrepancy = roughness(self._pool, space, near, names).discrepancy(problem.recordings, self.noise, offsets)
+        if discrepancy.nothing_counts(names):  # then the nearest is as good as it gets; doubts say that it is chance
+            discrepancy = NONE
+        objective = Objective(self._pool, space, names, self.noise, offsets, discrepancy=discrepancy)
+        best = polish_from(objective, np.concatenate([near[None], self._in_order(upto, discrepancy)[0]]))
+        for _ in range(GOES_ON):
+            if best.rested:
+                break
+            best = polish(objective, best.unit, known=best.jacobian)
+        self._found = objective, seen_past_chance(objective, best)
+
+    def _truer(self) -> Noise:
+        """The noise as the best fit shows it: slow, or shared by neighbours; the same as before if it is neither."""
+        problem, offsets = self._study.problem, offsets_of(self._study)
+        values = problem.space.as_dict(problem.space.from_unit(self.best.unit))
+        differences, clouds = [], []
+        outcomes = self._pool.map([Task(values, name) for name in problem.fit_on])
+        for recording, outcome in zip((problem.recordings[n] for n in problem.fit_on), outcomes, strict=True):
+            if not isinstance(outcome, Trajectory):
+                continue
+            off = residual(recording, outcome.series, self.noise, offsets).difference
+            if recording.series.correspondence:
+                differences.append(off)
+            elif recording.name in problem.clouds:
+                clouds.append(Cloud(recording.series.points, off))
+        if differences or not clouds:
+            return correlated_noise(self.noise, differences)
+        return cloud_noise(self.noise, clouds)
+
+    def _in_order(self, upto: int, discrepancy: Discrepancy) -> tuple[FloatArray, float]:
+        """Whole draws ``(N, D)`` in the unit cube, the nearest first, and its residual sum of squares."""
+        problem, offsets = self._study.problem, offsets_of(self._study)
+        takes = takes_of(self._study, self.noise)
+        theta, points, _ = self._store.read(upto)
+        total = np.zeros(len(theta))
+        for name in problem.fit_on:
+            recording = problem.recordings[name]
+            for k, p in enumerate(points[self._store.recordings.index(takes.of(name))]):
+                series = PointSeries(recording.series.time, p, recording.series.unit, recording.series.correspondence)
+                white = discrepancy.whitened(name, residual(recording, series, self.noise, offsets).white)
+                total[k] += float(white @ white)
+        order = np.argsort(total, kind="stable")
+        return np.asarray(theta[order]), float(total[order[0]])

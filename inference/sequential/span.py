@@ -1,0 +1,59 @@
+"""What draws span: of what is seen, the part that parameters can make."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from .takes import Takes
+
+#: Components by which clean draws differ by less than this are left out [noise standard deviations].
+LEAST = 0.5
+
+
+class Span:
+    """Projects what is seen of points that correspond onto the principal components of clean draws.
+
+    Recordings have thousands of numbers, and all that parameters do to them lies along a few directions: by far most
+    of the noise, and of what no parameter can make, lies across. With a hundred draws an estimator cannot find these
+    directions behind the noise where the draws are near each other, but without the noise they are plain. Unordered
+    points are left as they are.
+
+    Args:
+        takes: what is seen of a draw, and what was measured; where that lacks something (NaN) nothing is done.
+        points: draws as simulated ``(N, T, P, A)`` a group of takes.
+        log_weights: of the draws ``(N,)``; None if all weigh the same.
+    """
+
+    def __init__(self, takes: Takes, points: Sequence[FloatArray], log_weights: FloatArray | None) -> None:
+        rows = zip(takes.measured(), takes.correspondence, strict=True)
+        self._seen = [np.isfinite(m) if corresponding else None for m, corresponding in rows]
+        self._basis: FloatArray | None = None
+        draws = self._flat(takes.clean(points))
+        if not draws.shape[1]:
+            return
+        weights = np.ones(len(draws)) if log_weights is None else np.exp(log_weights - log_weights.max())
+        share = weights / weights.sum()
+        self._mean = share @ draws
+        # of few draws of many numbers; the other way round the matrix would be huge
+        off = np.sqrt(share)[:, None] * (draws - self._mean)
+        variances, vectors = np.linalg.eigh(off @ off.T)
+        kept = variances > min((LEAST * takes.noise.sd) ** 2, 0.5 * variances[-1])
+        self._basis = off.T @ (vectors[:, kept] / np.sqrt(variances[kept]))
+
+    def __call__(self, seen: Sequence[FloatArray]) -> list[FloatArray]:
+        """The same, one array ``(..., T, P, A)`` a group, with what lies across the span taken off."""
+        if self._basis is None:
+            return list(seen)
+        flat = self._mean + ((self._flat(seen) - self._mean) @ self._basis) @ self._basis.T
+        out, end = [np.array(a, dtype=np.float64) for a in seen], 0
+        for a, where in zip(out, self._seen, strict=True):
+            if where is not None:
+                begin, end = end, end + int(where.sum())
+                a[..., where] = flat[..., begin:end]
+        return out
+
+    def _flat(self, points: Sequence[FloatArray]) -> FloatArray:
+        """All that is seen of what corresponds, ``(..., M)``."""
+        parts = [a[..., where] for a, where in zip(points, self._seen, strict=True) if where is not None]
+        return np.concatenate(parts, axis=-1) if parts else np.zeros((len(points[0]), 0))
