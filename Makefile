@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 PIP    := $(BIN)/pip --quiet --disable-pip-version-check
 
 .PHONY: demo test lint bench bench-calibration bench-effects bench-hidden-small bench-inference bench-material bench-paper \
-	bench-perception bench-proposals bench-real bench-sets bench-sim clean
+	bench-perception bench-posterior bench-proposals bench-real bench-sets bench-sim clean
 
 # what the demo needs; tests and linters need a little more
 $(VENV)/.ready: pyproject.toml constraints.txt
@@ -44,7 +44,7 @@ lint: $(VENV)/.ready-dev
 		ln -s "$(CURDIR)/$$part" build/types/muslin/$$part; done
 	cd build/types && MYPYPATH=. "$(CURDIR)/$(BIN)/mypy" --config-file "$(CURDIR)/pyproject.toml" -p muslin
 
-bench: bench-calibration bench-hidden-small bench-inference bench-material bench-proposals bench-sets bench-sim
+bench: bench-calibration bench-hidden-small bench-inference bench-material bench-posterior bench-proposals bench-sets bench-sim
 
 # needs an hour or more; EFFECTS="--part test --cases 400 --minutes 2000" for the whole
 bench-effects: $(VENV)/.ready-bench
@@ -66,6 +66,9 @@ bench-perception: $(VENV)/.ready
 
 bench-calibration: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/calibration.py
+
+bench-posterior: $(VENV)/.ready
+	$(BIN)/python tests/benchmarks/posterior.py
 
 bench-proposals: $(VENV)/.ready
 	$(BIN)/python tests/benchmarks/proposals.py

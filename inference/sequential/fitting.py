@@ -76,6 +76,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
         *bound_notes(space, held),
         *failure_notes(space, *store.tried(upto), store.failures(), samples),
         *after_training(learner, posterior, samples),
+        *proposals.at_the_rim(samples, rounds),
         *found,
     ]
     about = {

@@ -9,7 +9,7 @@ from ...core.arrays import BoolArray, FloatArray
 from ...core.estimator import Posterior
 from ..posterior.mixture import MixturePosterior
 from .division import around, divide
-from .ellipsoid import Ellipsoid
+from .ellipsoid import WIDER, Ellipsoid
 from .region import Region
 from .success import Success
 
@@ -17,6 +17,8 @@ Kind = Literal["truncated", "posterior", "gaussian"]
 
 #: Share of every later round's proposal that is still the prior: what an early posterior has missed is found again.
 DEFENSIVE = 0.2
+#: A Gaussian has a thousandth beyond where an ellipsoid is made wider; a posterior with more than this goes on there.
+RIM = 0.05
 #: Draws of a posterior that an ellipsoid is put around.
 ELLIPSOID_DRAWS = 4000
 #: Draws that measure how often a proposal is accepted by the success model.
@@ -160,6 +162,21 @@ class Proposals:
         """How many of the draws ``(N, D)`` weigh anything."""
         log_weights = self.log_weights(theta)
         return len(theta) if log_weights is None else int(np.isfinite(log_weights).sum())
+
+    def at_the_rim(self, samples: FloatArray, rounds: int) -> list[str]:
+        """A sentence if the posterior of the last round may reach beyond where that drew from.
+
+        Args:
+            samples: of it ``(S, D)``.
+            rounds: so many were asked for.
+        """
+        share = 0.0 if self.region is None else float(np.mean(self.region.out(samples) > 1.0 / WIDER))
+        if share < RIM:
+            return []
+        return [
+            f"{100 * share:.0f} % of the posterior lie at the rim of where the last round was drawn from, so that more "
+            f"may lie beyond; another round looks there: [estimator] rounds = {rounds + 1}"
+        ]
 
     def corrected(self, learned: Posterior) -> Posterior | None:
         """The posterior under the prior; None where it must be learned anew with the weights of the prior."""

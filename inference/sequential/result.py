@@ -21,6 +21,8 @@ from ..posterior.physical import PhysicalPosterior
 SAMPLES = 2000
 #: A posterior that is so many times as wide as the best fit's ± is explained.
 _WIDER = 3.0
+#: What a fit leaves is told above this, in parts of what noise leaves.
+_MUCH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +85,11 @@ class FitResult:
             lines.append(
                 f"  {name}: best fit {self.estimate[k]:.4g} ± {self.sd[k]:.2g}{unit}, "
                 f"posterior {mean[k]:.4g} ± {spread[k]:.2g}{unit}"
+            )
+        if self.left > _MUCH:
+            lines.append(
+                f"  the best fit leaves {self.left:.2g} times the squares that noise leaves: ± and the posterior take "
+                "what is more for noise; muslin compare says where it is"
             )
         lines += self._explained(mean, spread)
         size, unit = (self.noise.sd * 1e3, "mm") if self.noise.unit == "m" else (self.noise.sd, self.noise.unit)

@@ -157,7 +157,9 @@ def test_models_are_kept_as_vague_as_they_are_told() -> None:
     for kept, c in zip(_models(found), left, strict=True):  # type: ignore[arg-type]
         ((_, sd, _),) = c.coefficients.values()
         assert kept["covariance"][1][1] == pytest.approx(sd**2)
-        np.testing.assert_allclose(kept["covariance"], c.fit.covariance * c.rss / COUNT)
+        prior = 12.0 * np.eye(len(c.fit.unit))  # information of the uniform prior, that no misfit takes away
+        data = np.linalg.inv(c.fit.covariance) - prior
+        np.testing.assert_allclose(kept["covariance"], np.linalg.inv(data * COUNT / c.rss + prior))
 
 
 def test_candidates_are_the_installed_effects_that_are_not_in_yet(small_study: Study) -> None:
