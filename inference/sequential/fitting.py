@@ -63,7 +63,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
                 posterior = cube_gaussian(polishing.best.unit, polishing.best.widened)
             else:
                 study.progress(f"round {k + 1} of {rounds}: training {config.estimator.name}", 0, 0)
-                posterior = learner.learn(polishing.takes, theta, points, numbers, proposals, k)
+                posterior = learner.learn(polishing.takes, polishing.predicted, theta, points, numbers, proposals, k)
             if stopping.after(posterior) or k + 1 == rounds:
                 break
             proposals.add(posterior, *store.tried(upto), within)

@@ -7,7 +7,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.rollout import Trajectory
 from ...core.series import PointSeries
-from ...core.study import SimulationPool, Study, Task
+from ...core.study import Outcome, SimulationPool, Study, Task
 from ..cloud_noise import Cloud, cloud_noise
 from ..correlated_noise import correlated_noise
 from ..discrepancy import NONE, Discrepancy
@@ -62,6 +62,7 @@ class Polishing:
         self._study, self._pool, self._store = study, pool, store
         self.noise, self.simulations = noise, 0
         self._found: tuple[Objective, Polished] | None = None
+        self._outcomes: dict[str, Outcome] = {}  # of the best fit, by recording
 
     @property
     def best(self) -> Polished:
@@ -84,6 +85,13 @@ class Polishing:
     def left(self) -> float:
         """What the best fit leaves, in parts of what noise leaves."""
         return self.best.rss / self.best.count
+
+    @property
+    def predicted(self) -> list[FloatArray]:
+        """By the best fit, ``(T, P, A)`` for every group of :attr:`takes`; none if one cannot be simulated again."""
+        outcomes = [self._outcomes[name] for name in self._store.recordings]
+        found = [o.series.points for o in outcomes if isinstance(o, Trajectory)]
+        return found if len(found) == len(outcomes) else []
 
     def look(self, upto: int) -> FloatArray:
         """Find the best fit with the first ``upto`` draws, and return these ``(N, D)``, the nearest first."""
@@ -124,14 +132,15 @@ class Polishing:
                 break
             best = polish(objective, best.unit, known=best.jacobian)
         self._found = objective, seen_past_chance(objective, best)
+        values = space.as_dict(space.from_unit(best.unit))
+        self._outcomes = dict(zip(names, self._pool.map([Task(values, name) for name in names]), strict=True))
 
     def _truer(self) -> Noise:
         """The noise as the best fit shows it: slow, or shared by neighbours; the same as before if it is neither."""
         problem, offsets = self._study.problem, offsets_of(self._study)
-        values = problem.space.as_dict(problem.space.from_unit(self.best.unit))
         differences, clouds = [], []
-        outcomes = self._pool.map([Task(values, name) for name in problem.fit_on])
-        for recording, outcome in zip((problem.recordings[n] for n in problem.fit_on), outcomes, strict=True):
+        for name, outcome in self._outcomes.items():
+            recording = problem.recordings[name]
             if not isinstance(outcome, Trajectory):
                 continue
             off = residual(recording, outcome.series, self.noise, offsets).difference

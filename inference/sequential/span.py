@@ -9,6 +9,8 @@ from .takes import Takes
 
 #: Components by which clean draws differ by less than this are left out [noise standard deviations].
 LEAST = 0.5
+#: A measurement is as far off the best fit at most as flaws move this share of draws.
+USUAL = 0.95
 
 
 class Span:
@@ -28,6 +30,7 @@ class Span:
     def __init__(self, takes: Takes, points: Sequence[FloatArray], log_weights: FloatArray | None) -> None:
         rows = zip(takes.measured(), takes.correspondence, strict=True)
         self._seen = [np.isfinite(m) if corresponding else None for m, corresponding in rows]
+        self._takes = takes
         self._basis: FloatArray | None = None
         draws = self._flat(takes.clean(points))
         if not draws.shape[1]:
@@ -40,13 +43,37 @@ class Span:
         variances, vectors = np.linalg.eigh(off @ off.T)
         kept = variances > min((LEAST * takes.noise.sd) ** 2, 0.5 * variances[-1])
         self._basis = off.T @ (vectors[:, kept] / np.sqrt(variances[kept]))
+        self._draws = (draws - self._mean) @ self._basis
 
     def __call__(self, seen: Sequence[FloatArray]) -> list[FloatArray]:
         """The same, one array ``(..., T, P, A)`` a group, with what lies across the span taken off."""
+        return list(seen) if self._basis is None else self._at(self._coordinates(seen), seen)
+
+    def measured(self, predicted: Sequence[FloatArray], flawed: Sequence[FloatArray]) -> list[FloatArray]:
+        """The measurement, with no more of what the best fit leaves than flaws of a measurement would.
+
+        An estimator knows nothing of models that are wrong: what it never saw of a draw takes it anywhere. What the
+        best fit leaves lies across all that parameters do next to it, but not across the span, which bends.
+
+        Args:
+            predicted: by the best fit, ``(T, P, A)`` a group.
+            flawed: the draws that make the span, as seen ``(N, T, P, A)``.
+        """
         if self._basis is None:
-            return list(seen)
-        flat = self._mean + ((self._flat(seen) - self._mean) @ self._basis) @ self._basis.T
-        out, end = [np.array(a, dtype=np.float64) for a in seen], 0
+            return self._takes.measured()
+        best = self._coordinates(self._takes.clean(predicted))
+        off = self._coordinates(self._takes.measured()) - best
+        most = np.quantile(np.linalg.norm(self._coordinates(flawed) - self._draws, axis=-1), USUAL)
+        return self._at(best + off * min(1.0, most / np.linalg.norm(off)), self._takes.measured())
+
+    def _coordinates(self, seen: Sequence[FloatArray]) -> FloatArray:
+        return np.asarray((self._flat(seen) - self._mean) @ self._basis)
+
+    def _at(self, coordinates: FloatArray, like: Sequence[FloatArray]) -> list[FloatArray]:
+        """Points at ``coordinates (..., K)``; where these do not tell them they are as in ``like``."""
+        assert self._basis is not None
+        flat = self._mean + coordinates @ self._basis.T
+        out, end = [np.array(a, dtype=np.float64) for a in like], 0
         for a, where in zip(out, self._seen, strict=True):
             if where is not None:
                 begin, end = end, end + int(where.sum())

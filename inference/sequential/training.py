@@ -58,6 +58,7 @@ class Learner:
     def learn(
         self,
         takes: Takes,
+        predicted: list[FloatArray],
         theta: FloatArray,
         points: list[FloatArray],
         numbers: IntArray,
@@ -68,6 +69,7 @@ class Learner:
 
         Args:
             takes: what is seen of a draw, and what was measured.
+            predicted: by the best fit, ``(T, P, A)`` a group of takes; none if it cannot be simulated again.
             theta: whole draws ``(N, D)``, in the unit cube.
             points: of the recordings that are simulated, clean, ``(N, T, P, A)``.
             numbers: of the draws ``(N,)``.
@@ -76,7 +78,8 @@ class Learner:
         """
         seed, log_weights = self._study.config.study.seed, proposals.log_weights(theta)
         span, self._correspondence = Span(takes, points, log_weights), takes.correspondence
-        seen, self._measured = span(takes.observe(points, numbers, seed)), span(takes.measured())
+        flawed = takes.observe(points, numbers, seed)
+        seen, self._measured = span(flawed), span.measured(predicted, flawed) if predicted else span(takes.measured())
         learned = self._train(theta, seen, log_weights, seed + round_number)
         posterior = proposals.corrected(learned)
         if posterior is None:

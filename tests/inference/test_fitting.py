@@ -40,6 +40,24 @@ def test_a_right_model_is_fitted_within_its_uncertainty(small_study: Study) -> N
     assert all(row.rmse < row.baseline for row in comparison.rows)
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_posterior_is_as_wide_as_the_data_make_it(tmp_path: Path, seed: int) -> None:
+    """Of a model that is right and nearly linear as far as the posterior reaches; sixteen draws a round."""
+    result = Study.load(write_study(tmp_path, small_measurement(seed=seed)), workers=0).fit()
+    assert result.left < 1.2 and "times the squares" not in result.text()
+    width = result.samples.std(axis=0) / result.sd
+    assert np.all((width > 0.7) & (width < 1.5)), width
+    assert np.all(np.abs(result.samples.mean(axis=0) - result.estimate) < 0.6 * result.sd)
+
+
+def test_what_a_model_misses_makes_its_posterior_as_much_wider(tmp_path: Path) -> None:
+    drag = REGISTRY.get("effect", "viscous-damping")(rate=3.0)
+    result = Study.load(write_study(tmp_path, small_measurement(drag)), workers=0).fit()
+    assert result.left > 4.0 and "times the squares that noise leaves" in result.text()
+    width = result.samples.std(axis=0) / result.sd
+    assert np.all((width > 0.5) & (width < 2.0)), width
+
+
 def test_with_tails_what_goes_another_way_does_not_lead_the_fit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
