@@ -184,15 +184,20 @@ def polish(
     return Polished(best.unit, best.white, jacobian, covariance, count, rested)
 
 
-def polish_from(objective: Objective, starts: FloatArray) -> Polished:
+def polish_from(objective: Objective, starts: FloatArray, best: Polished | None = None) -> Polished:
     """The best of least squares from the first of ``starts (N, D)``, and while it leaves a misfit, from others.
 
     An object that may fall one way or another (a rope on a table, a fold) has valleys that no descent leaves. The
-    others are the next that are not near one that was tried, nor near where that led.
+    others are the next that are not near one that was tried, nor near where that led. With ``best``, what least squares
+    have led to before, all starts are others.
     """
-    best = polish(objective, starts[0])
-    tried, known = 1, [starts[0], best.unit]
-    for start in starts[1:]:
+    if best is None:
+        best = polish(objective, starts[0])
+        known = [starts[0], best.unit]
+    else:
+        known = [best.unit]
+    tried = 1
+    for start in starts:
         if best.rss < MISFIT * best.count or tried == STARTS:
             break
         if min(np.abs(start - k).max() for k in known) > APART:

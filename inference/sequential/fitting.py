@@ -12,6 +12,7 @@ from ...core.store import storage_errors
 from ...core.study import SimulationPool, Study, Task
 from ..estimators.inputs import MIN_DRAWS
 from ..noise import Noise, estimate_noise
+from ..polish import MISFIT
 from ..posterior.cube_gaussian import cube_gaussian
 from .bounds import at_bounds, bound_notes
 from .doubts import doubts
@@ -26,6 +27,8 @@ from .training import Learner, after_training, make_estimator
 
 #: So many draws of the first round, and not one of them whole, end a fit at once.
 HOPELESS = 20
+#: Draws of a first posterior that are simulated where the best fit leaves a misfit.
+GUESSES = 24
 
 
 def fit(study: Study) -> FitResult:
@@ -55,9 +58,15 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
             if len(theta) < 0.1 * upto or proposals.counting(theta) < MIN_DRAWS:
                 raise _too_many_failed(store, space)
             study.progress(f"round {k + 1} of {rounds}: polishing the best draw by least squares", 0, 0)
-            draws = polishing.look(upto)
+            polishing.look(upto)
+            if k == 0 and polishing.left > MISFIT:  # a wrong valley, perhaps, and what all draws tell leads elsewhere
+                study.progress(
+                    f"training {config.estimator.name} to look elsewhere, as the best fit leaves a misfit", 0, 0
+                )
+                guess = learner.learn(takes_of(study, polishing.noise), [], theta, points, numbers, proposals, k)
+                polishing.look_from(guess.sample(GUESSES, np.random.default_rng([seed, 4049])))
             first = k == 0 < rounds - 1 and proposals.kind == "truncated"
-            within = polishing.narrowed(draws, np.random.default_rng([seed, 4051])) if first else None
+            within = polishing.narrowed(upto, np.random.default_rng([seed, 4051])) if first else None
             posterior: Posterior
             if within is not None:
                 posterior = cube_gaussian(polishing.best.unit, polishing.best.widened)

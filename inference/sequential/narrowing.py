@@ -20,6 +20,8 @@ _TURNS, _LOOKS = 3, 4
 _FACTOR = 3.0
 #: An end is near enough if the log likelihood falls by no more than this times what it is meant to.
 _NEAR_ENOUGH = 4.0
+#: From this on a likelihood counts as rugged: the posterior may reach that much farther in -2 log likelihood.
+_BUMPY = 1.5
 #: So many other places are searched from, each so far from those known in some coordinate of the unit cube.
 _ELSEWHERE, _APART = 2, 0.1
 #: Less than this share of an ellipsoid cannot be drawn from.
@@ -52,7 +54,11 @@ def narrowed(objective: Objective, best: Polished, starts: FloatArray, rng: np.r
         if turn == _TURNS or all(worse(best, w) < m for w, m in zip(whites, worst, strict=True)):
             break
         covariance = _turned(best, rays, at, whites)
-    low, high = _past_cuts(*np.split(_ends(objective, best, rays, at, bound, whites), 2), *np.split(bound, 2))
+    rugged = _rugged(best, at, whites)
+    if rugged > _BUMPY:
+        at = np.minimum(np.sqrt(rugged) * far, bound)
+        whites = _look(objective, best, rays, at)
+    low, high = _past_cuts(*np.split(_ends(objective, best, rays, at, bound, whites, rugged), 2), *np.split(bound, 2))
     half, axes = np.maximum(0.5 * (low + high), _SMALLEST), rays[len(low) :].T
     ellipsoid = Ellipsoid(best.unit + axes @ (0.5 * (high - low)), axes * half, rng)
     # where there is a misfit, other places were searched from before
@@ -67,6 +73,28 @@ def _rays(covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     values, axes = np.linalg.eigh(covariance)
     far = WIDER * inner_radius(len(values)) * np.sqrt(np.maximum(values, 0.0))
     return np.concatenate([-axes.T, axes.T]), np.concatenate([far, far])
+
+
+def _rugged(best: Polished, at: FloatArray, whites: list[FloatArray | None]) -> float:
+    """How much farther out in -2 log likelihood the posterior may reach, as the best fit may be one for its luck.
+
+    With ``w`` at three points on a line, ``a`` and ``b`` from the middle one, what a linear model makes worse at the
+    ends is ``a b |dw / (a + b)|^2`` in the weighted mean. What is more than that the middle owes to bumps of the
+    likelihood, or to its bends. A search goes where bumps are kind, and what it pays, the root mean square over the D
+    axes, is shared by the D parameters (as in :mod:`..rough_curvature`).
+
+    Args:
+        best: the best fit.
+        at: distances of the ends of all axes ``(2 D,)``; whites: white residuals there.
+    """
+    count = len(at) // 2
+    lucks = []
+    for a, b, below, above in zip(at[:count], at[count:], whites[:count], whites[count:], strict=True):
+        if below is not None and above is not None and min(a, b) > 0.0:
+            worse_ends = (a * worse(best, above) + b * worse(best, below)) / (a + b)
+            left = max(1.0, best.rss / best.count)
+            lucks.append(worse_ends - a * b * float(np.sum((above - below) ** 2)) / (a + b) ** 2 / left)
+    return 1.0 + float(np.sqrt(np.mean(np.square(lucks)))) / count if lucks else 1.0
 
 
 def _look(objective: Objective, best: Polished, rays: FloatArray, at: FloatArray) -> list[FloatArray | None]:
@@ -109,6 +137,7 @@ def _ends(
     at: FloatArray,
     bound: FloatArray,
     whites: list[FloatArray | None],
+    rugged: float,
 ) -> FloatArray:
     """How far the ellipsoid reaches along unit vectors ``(R, D)`` from the best fit ``(R,)``.
 
@@ -116,8 +145,9 @@ def _ends(
         objective, best, rays: see :func:`narrowed`.
         at: distances that were looked at ``(R,)``; whites: what was found there.
         bound: where the cube ends ``(R,)``; moved in to where nothing can be simulated.
+        rugged: by how much more the log likelihood must fall.
     """
-    least, meant = inner_radius(rays.shape[1]) ** 2, _meant(best)
+    least, meant = rugged * inner_radius(rays.shape[1]) ** 2, rugged * _meant(best)
     inside, outside, at = np.zeros(len(at)), bound.copy(), at.copy()
     looking = np.flatnonzero(at < bound)
     found = np.array([worse(best, white) for white in whites])[looking]

@@ -93,8 +93,8 @@ class Polishing:
         found = [o.series.points for o in outcomes if isinstance(o, Trajectory)]
         return found if len(found) == len(outcomes) else []
 
-    def look(self, upto: int) -> FloatArray:
-        """Find the best fit with the first ``upto`` draws, and return these ``(N, D)``, the nearest first."""
+    def look(self, upto: int) -> None:
+        """Find the best fit with the first ``upto`` draws."""
         before = self._pool.count
         if self._found is None:
             self._polish(upto, self._in_order(upto, NONE)[0][0])
@@ -108,11 +108,22 @@ class Polishing:
             self.noise = truer
             self._polish(upto, self.best.unit)
         self.simulations += self._pool.count - before
-        return self._in_order(upto, self.objective.discrepancy)[0]
 
-    def narrowed(self, draws: FloatArray, rng: np.random.Generator) -> Ellipsoid | None:
-        """Where the posterior is, with ``draws (N, D)``, the nearest first; see :func:`~.narrowing.narrowed`."""
+    def look_from(self, guesses: FloatArray) -> None:
+        """Search from ``guesses (G, D)``, too, those that come nearest first, while the best fit leaves a misfit."""
         before = self._pool.count
+        whites = self.objective.many(guesses)
+        nearest = np.argsort([np.inf if w is None else float(w @ w) for w in whites], kind="stable")
+        best = polish_from(self.objective, guesses[nearest], self.best)
+        if best is not self.best:
+            self._study.progress("the estimator has found a better place than the draws", 0, 0)
+            self._rest(self.objective, best)
+        self.simulations += self._pool.count - before
+
+    def narrowed(self, upto: int, rng: np.random.Generator) -> Ellipsoid | None:
+        """Where the posterior is, as the first ``upto`` draws tell; see :func:`~.narrowing.narrowed`."""
+        before = self._pool.count
+        draws = self._in_order(upto, self.objective.discrepancy)[0]
         found = narrowed(self.objective, self.best, draws, rng)
         self.simulations += self._pool.count - before
         return found
@@ -127,6 +138,11 @@ class Polishing:
             discrepancy = NONE
         objective = Objective(self._pool, space, names, self.noise, offsets, discrepancy=discrepancy)
         best = polish_from(objective, np.concatenate([near[None], self._in_order(upto, discrepancy)[0]]))
+        self._rest(objective, best)
+
+    def _rest(self, objective: Objective, best: Polished) -> None:
+        """Go on from what a search has led to until it rests, and keep that."""
+        space, names = objective.space, objective.recordings
         for _ in range(GOES_ON):
             if best.rested:
                 break
