@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.arrays import BoolArray, FloatArray
 from ..polish import FEW_EVALUATIONS, MISFIT, Objective, Polished, polish
 from .ellipsoid import WIDER, Ellipsoid, inner_radius
 
@@ -56,9 +56,11 @@ def narrowed(objective: Objective, best: Polished, starts: FloatArray, rng: np.r
         covariance = _turned(best, rays, at, whites)
     rugged = _rugged(best, at, whites)
     if rugged > _BUMPY:
-        at = np.minimum(np.sqrt(rugged) * far, bound)
+        far = np.sqrt(rugged) * far
+        at = np.minimum(far, bound)
         whites = _look(objective, best, rays, at)
-    low, high = _past_cuts(*np.split(_ends(objective, best, rays, at, bound, whites, rugged), 2), *np.split(bound, 2))
+    ends = _ends(objective, best, rays, at, bound, whites, rugged)
+    low, high = _past_cuts(ends.reshape(2, -1), ends.reshape(2, -1) >= bound.reshape(2, -1), far[: len(best.unit)])
     half, axes = np.maximum(0.5 * (low + high), _SMALLEST), rays[len(low) :].T
     ellipsoid = Ellipsoid(best.unit + axes @ (0.5 * (high - low)), axes * half, rng)
     # where there is a misfit, other places were searched from before
@@ -168,18 +170,20 @@ def _ends(
     return outside
 
 
-def _past_cuts(
-    low: FloatArray, high: FloatArray, low_bound: FloatArray, high_bound: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Ends of axes ``(D,)``, moved out where the cube cuts the posterior off: an ellipsoid is thin at its own ends.
+def _past_cuts(ends: FloatArray, cut: BoolArray, far: FloatArray) -> FloatArray:
+    """Both ends of the axes ``(2, D)``, moved out where the cube cuts the posterior off.
 
-    Where the cube cuts off m of the axes, their corners lie within the root of m times as far.
+    An ellipsoid is thin at its own ends: it reaches as far as on the other side, or as its covariance says where that
+    is cut off as well, as all directions are that lead out of a corner. Where the cube cuts off m of the axes, their
+    corners lie within the root of m times as far.
+
+    Args:
+        ends: found ``(2, D)``; cut: which of them the cube, or what can be simulated, makes ``(2, D)``.
+        far: by the covariance ``(D,)``.
     """
-    cut_low, cut_high = low >= low_bound, high >= high_bound
-    factor = np.sqrt(np.sum(cut_low | cut_high) - 1.0 + WIDER**2)
-    past_low = np.where(cut_low, np.maximum(factor * low, np.where(cut_high, 0.0, high)), low)
-    past_high = np.where(cut_high, np.maximum(factor * high, np.where(cut_low, 0.0, low)), high)
-    return past_low, past_high
+    factor = np.sqrt(np.sum(cut.any(axis=0)) - 1.0 + WIDER**2)
+    other = np.where(cut[::-1], far, ends[::-1])
+    return np.asarray(np.where(cut, np.maximum(factor * ends, other), ends))
 
 
 def _to_the_bound(unit: FloatArray, ray: FloatArray) -> float:
