@@ -68,6 +68,8 @@ def test_another_start_is_tried_where_the_first_leaves_a_misfit(left: float) -> 
     assert stuck.rss == pytest.approx(left * stuck.count, rel=1e-3)
     best = polish_from(TwoValleys(left), starts)
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
+    np.testing.assert_allclose(polish_from(TwoValleys(left), starts[1:], stuck).unit, best.unit, atol=1e-3)
+    assert polish_from(TwoValleys(left), starts[:2], stuck) is stuck  # from where it has been nothing is tried
 
 
 class Bent(Linear):

@@ -75,3 +75,16 @@ def test_recordings_tell_of_parameters_together() -> None:
     each = moved(np.concatenate([theta, np.zeros((40, 2))], axis=1))
     span = Span(takes([each[0]] * 16, [True] * 16), [each] * 16, None)
     np.testing.assert_allclose(span([each] * 16)[7], each, atol=1e-9)
+
+
+def test_what_a_best_fit_leaves_counts_no_more_than_noise() -> None:
+    clean = moved(RNG.normal(size=(40, 3)))
+    flawed = clean + SD * RNG.normal(size=clean.shape)
+    best, noise = clean[0], SD * RNG.normal(size=SHAPE)
+    for misfit, kept in ((0.0, 1.0), (50.0, 0.01)):
+        off = misfit * SD * DIRECTIONS[1] + noise
+        span = Span(takes([best + off], [True]), [clean], None)
+        seen, plain = span.measured([best], [flawed])[0] - best, span([best + off])[0] - best
+        np.testing.assert_allclose(seen, plain * np.linalg.norm(seen) / np.linalg.norm(plain), atol=1e-9)
+        assert np.linalg.norm(seen) == pytest.approx(kept * np.linalg.norm(plain), rel=1e-6 if misfit == 0 else 2.0)
+        assert np.linalg.norm(seen) < 5.0 * SD  # three directions of noise
