@@ -184,7 +184,7 @@ name = {_value(plan.simulator)}  # installed: {", ".join(REGISTRY.names("simulat
 
 [estimator]
 name = {_value(plan.estimator)}  # installed: {", ".join(REGISTRY.names("estimator"))}
-rounds = {default.rounds}  # at most; each draws where the last one found the posterior
+rounds = {default.rounds}  # at most; the second and later ones draw where the posterior is
 draws = {default.draws}  # simulations a round and recording
 stop = {default.stop}  # rounds end once the posterior moves by less, in its own standard deviations; 0: never
 proposal = {_value(default.proposals)}  # or "posterior"; "gaussian" is BayesSim's own
