@@ -1,7 +1,8 @@
 """Least squares from a good start: the best parameters and how far the data let them move."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -26,7 +27,7 @@ TOLD_APART = 0.3
 NEARBY, COARSE = 0.02, 0.002
 
 #: Information of the uniform prior: a unit interval has the variance 1/12.
-_PRIOR = 12.0
+PRIOR = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +45,20 @@ class Polished(Found):
     rested: bool = False
 
     @property
+    def left(self) -> float:
+        """Squares that are left, in parts of what noise leaves."""
+        return self.rss / self.count
+
+    @property
+    def excess(self) -> float:
+        """By how much less the data tell than noise alone would let them: what is left beyond noise counts as noise."""
+        return max(1.0, self.left)
+
+    @property
     def widened(self) -> FloatArray:
-        """The covariance ``(D, D)`` to be told: what is left beyond noise makes the data tell that much less."""
-        left = max(1.0, self.rss / self.count)
-        information = np.linalg.inv(self.covariance) + (left - 1.0) * _PRIOR * np.eye(len(self.unit))
-        return np.asarray(left * np.linalg.inv(information), float)
+        """The covariance ``(D, D)`` to be told, with the excess counted as noise."""
+        information = np.linalg.inv(self.covariance) + (self.excess - 1.0) * PRIOR * np.eye(len(self.unit))
+        return np.asarray(self.excess * np.linalg.inv(information), float)
 
 
 class Objective:
@@ -179,9 +189,19 @@ def polish(
         best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
         used += more + len(start)
         rested = before - best.rss < CHANCE * enough * best.rss  # so near that the derivatives hold
-    information = jacobian.T @ jacobian + _PRIOR * np.eye(len(start))  # the prior bounds what the data leave open
+    information = jacobian.T @ jacobian + PRIOR * np.eye(len(start))  # the prior bounds what the data leave open
     covariance = np.asarray(np.linalg.inv(information), float)
     return Polished(best.unit, best.white, jacobian, covariance, count, rested)
+
+
+def searches(objective: Objective, starts: FloatArray, known: Sequence[FloatArray]) -> Iterator[Polished]:
+    """Short searches from those of ``starts (N, D)`` that are not near ``known`` places, nor near where others led."""
+    places = list(known)
+    for start in starts:
+        if min(np.abs(start - place).max() for place in places) > APART:
+            found = polish(objective, start, FEW_EVALUATIONS, roughly=True)
+            places += [start, found.unit]
+            yield found
 
 
 def polish_from(objective: Objective, starts: FloatArray, best: Polished | None = None) -> Polished:
@@ -191,19 +211,11 @@ def polish_from(objective: Objective, starts: FloatArray, best: Polished | None 
     others are the next that are not near one that was tried, nor near where that led. With ``best``, what least squares
     have led to before, all starts are others.
     """
+    known = []
     if best is None:
-        best = polish(objective, starts[0])
-        known = [starts[0], best.unit]
-    else:
-        known = [best.unit]
-    tried = 1
-    for start in starts:
-        if best.rss < MISFIT * best.count or tried == STARTS:
-            break
-        if min(np.abs(start - k).max() for k in known) > APART:
-            tried += 1
-            other = polish(objective, start, FEW_EVALUATIONS, roughly=True)
-            known += [start, other.unit]
-            if best.rss - other.rss > CHANCE * TOLD_APART * best.rss / best.count:  # more than the same place again
-                best = polish(objective, other.unit)
+        best, known = polish(objective, starts[0]), [starts[0]]
+    others = islice(searches(objective, starts, [*known, best.unit]), STARTS - 1)
+    while best.left >= MISFIT and (other := next(others, None)) is not None:
+        if best.rss - other.rss > CHANCE * TOLD_APART * best.left:  # more than the same place again
+            best = polish(objective, other.unit)
     return best

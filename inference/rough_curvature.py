@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core.arrays import FloatArray
-from .polish import Objective, Polished
+from .polish import PRIOR, Objective, Polished
 
 #: Half-widths of central differences in the unit cube, tried from the first on.
 WIDTHS = (0.002, 0.008, 0.032, 0.1)
@@ -64,10 +64,10 @@ def seen_past_chance(objective: Objective, best: Polished) -> Polished:
     information = jacobian.T @ jacobian - np.diag([differences[-1].chance for differences in found])
     values, vectors = np.linalg.eigh(information)
     # the uniform prior of a unit interval has variance 1/12
-    covariance = (vectors / (np.maximum(values, 0.0) + 12.0)) @ vectors.T
+    covariance = (vectors / (np.maximum(values, 0.0) + PRIOR)) @ vectors.T
     luck = float(np.sqrt(np.mean([differences[0].luck ** 2 for differences in found])))
     grown = (1.0 + luck / len(best.unit)) * covariance
-    scale = np.sqrt(np.minimum(1.0, 1.0 / 12.0 / np.diag(grown)))  # no less is known than the prior says
+    scale = np.sqrt(np.minimum(1.0, 1.0 / PRIOR / np.diag(grown)))  # no less is known than the prior says
     return replace(best, covariance=np.asarray(grown * np.outer(scale, scale), float))
 
 

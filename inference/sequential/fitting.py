@@ -59,7 +59,9 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
                 raise _too_many_failed(store, space)
             study.progress(f"round {k + 1} of {rounds}: polishing the best draw by least squares", 0, 0)
             polishing.look(upto)
-            if k == 0 and polishing.left > MISFIT:  # a wrong valley, perhaps, and what all draws tell leads elsewhere
+            if (
+                k == 0 and polishing.best.left >= MISFIT
+            ):  # a wrong valley, perhaps, and what all draws tell leads elsewhere
                 study.progress(
                     f"training {config.estimator.name} to look elsewhere, as the best fit leaves a misfit", 0, 0
                 )
@@ -96,7 +98,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
         "seconds": time.monotonic() - began,
         "warnings": warnings,
         "derivative_step": polishing.objective.discrepancy.step,
-        "left": polishing.left,
+        "left": best.left,
         "at_bound": [n for i, n in enumerate(space.names) if any(a.index == i for a in held)],
     }
     sd = physical_sd(space, best.unit, best.widened)

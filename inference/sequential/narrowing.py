@@ -6,12 +6,12 @@ may be of chance, a valley may bend, end in a plateau or be one of several. So t
 before it is drawn from.
 """
 
-from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray
-from ..polish import FEW_EVALUATIONS, MISFIT, Objective, Polished, polish
+from ..polish import MISFIT, PRIOR, Objective, Polished, searches
 from .ellipsoid import WIDER, Ellipsoid, inner_radius
 
 #: So often at most axes are turned by what is found at their ends, and then ends are looked for along them.
@@ -22,8 +22,8 @@ _FACTOR = 3.0
 _NEAR_ENOUGH = 4.0
 #: From this on a likelihood counts as rugged: the posterior may reach that much farther in -2 log likelihood.
 _BUMPY = 1.5
-#: So many other places are searched from, each so far from those known in some coordinate of the unit cube.
-_ELSEWHERE, _APART = 2, 0.1
+#: So many other places are searched from.
+_ELSEWHERE = 2
 #: Less than this share of an ellipsoid cannot be drawn from.
 _LEAST_SHARE = 1e-3
 #: The smallest half axis in the unit cube.
@@ -64,9 +64,12 @@ def narrowed(objective: Objective, best: Polished, starts: FloatArray, rng: np.r
     half, axes = np.maximum(0.5 * (low + high), _SMALLEST), rays[len(low) :].T
     ellipsoid = Ellipsoid(best.unit + axes @ (0.5 * (high - low)), axes * half, rng)
     # where there is a misfit, other places were searched from before
-    for other in [] if best.rss > MISFIT * best.count else _elsewhere(objective, best, starts, ellipsoid):
-        if ellipsoid.out(other[None])[0] > 1.0:
-            ellipsoid = ellipsoid.stretched(other, rng)
+    if best.left < MISFIT:
+        outside = starts[ellipsoid.out(starts) > 1.0]
+        for other in islice(searches(objective, outside, [best.unit]), _ELSEWHERE):
+            as_good = worse(best, other.white) < inner_radius(len(best.unit)) ** 2
+            if as_good and ellipsoid.out(other.unit[None])[0] > 1.0:
+                ellipsoid = ellipsoid.stretched(other.unit, rng)
     return ellipsoid if ellipsoid.share > _LEAST_SHARE else None
 
 
@@ -94,8 +97,8 @@ def _rugged(best: Polished, at: FloatArray, whites: list[FloatArray | None]) -> 
     for a, b, below, above in zip(at[:count], at[count:], whites[:count], whites[count:], strict=True):
         if below is not None and above is not None and min(a, b) > 0.0:
             worse_ends = (a * worse(best, above) + b * worse(best, below)) / (a + b)
-            left = max(1.0, best.rss / best.count)
-            lucks.append(worse_ends - a * b * float(np.sum((above - below) ** 2)) / (a + b) ** 2 / left)
+            by_slope = a * b * float(np.sum((above - below) ** 2)) / (a + b) ** 2
+            lucks.append(worse_ends - by_slope / best.excess)
     return 1.0 + float(np.sqrt(np.mean(np.square(lucks)))) / count if lucks else 1.0
 
 
@@ -121,15 +124,14 @@ def _turned(best: Polished, rays: FloatArray, at: FloatArray, whites: list[Float
         (a, below), (b, above) = ends if len(ends) == 2 else [(0.0, best.white), *(ends or [(0.0, best.white)])]
         if b != a:
             slopes[:, k] = (above - below) / (b - a)
-    left = max(1.0, best.rss / best.count)
-    information = slopes.T @ slopes / left + 12.0 * np.eye(count)  # the uniform prior has variance 1/12
+    information = slopes.T @ slopes / best.excess + PRIOR * np.eye(count)
     axes = rays[count:].T
     return np.asarray(axes @ np.linalg.inv(information) @ axes.T)
 
 
 def worse(best: Polished, white: FloatArray | None) -> float:
     """By how much -2 log likelihood is more than at the best fit, what that leaves beyond noise taken for noise."""
-    return np.inf if white is None else (float(white @ white) - best.rss) / max(1.0, best.rss / best.count)
+    return np.inf if white is None else (float(white @ white) - best.rss) / best.excess
 
 
 def _ends(
@@ -191,18 +193,3 @@ def _to_the_bound(unit: FloatArray, ray: FloatArray) -> float:
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = np.where(ray > 0, (1.0 - unit) / ray, np.where(ray < 0, -unit / ray, np.inf))
     return float(steps.min())
-
-
-def _elsewhere(objective: Objective, best: Polished, starts: FloatArray, ellipsoid: Ellipsoid) -> Iterator[FloatArray]:
-    """Places ``(D,)`` that searches from outside the ellipsoid come to, and that are as good as the best fit."""
-    known, tried = [best.unit], 0
-    for start in starts:
-        if tried == _ELSEWHERE:
-            break
-        if ellipsoid.out(start[None])[0] <= 1.0 or min(np.abs(start - k).max() for k in known) <= _APART:
-            continue
-        tried += 1
-        other = polish(objective, start, FEW_EVALUATIONS, roughly=True)
-        known += [start, other.unit]
-        if worse(best, other.white) < inner_radius(len(start)) ** 2:
-            yield other.unit

@@ -32,19 +32,19 @@ def offsets_of(study: Study) -> Offsets:
     return Offsets(study.config.nuisance.clock_offset, study.config.nuisance.constant_offset)
 
 
-def takes_of(study: Study, noise: Noise, left: float = 1.0) -> Takes:
+def takes_of(study: Study, noise: Noise, excess: float = 1.0) -> Takes:
     """The recordings that a study is fitted on, as an estimator sees them.
 
     Args:
         study: whose.
         noise: of the measurement.
-        left: what the best fit leaves, in parts of what noise leaves. What is more than noise is given to draws as if
-            it were noise (a power posterior: Miller and Dunson, *Robust Bayesian inference via coarsening*, 2019): a
-            model that misses the data by much does not know its parameters by little.
+        excess: of the best fit. Draws are given that much more noise, in squares (a power posterior: Miller and Dunson,
+            *Robust Bayesian inference via coarsening*, 2019): a model that misses the data by much does not know its
+            parameters by little.
     """
     problem = study.problem
     recordings = [problem.recordings[r] for r in problem.fit_on]
-    larger = replace(noise, sd=noise.sd * max(1.0, left) ** 0.5)
+    larger = replace(noise, sd=noise.sd * excess**0.5)
     return Takes(Observer(recordings, larger, offsets_of(study), problem.clouds), problem.scenarios)
 
 
@@ -79,12 +79,7 @@ class Polishing:
     @property
     def takes(self) -> Takes:
         """As an estimator is to see them after all that was found."""
-        return takes_of(self._study, self.noise, self.left)
-
-    @property
-    def left(self) -> float:
-        """What the best fit leaves, in parts of what noise leaves."""
-        return self.best.rss / self.best.count
+        return takes_of(self._study, self.noise, self.best.excess)
 
     @property
     def predicted(self) -> list[FloatArray]:
@@ -100,7 +95,7 @@ class Polishing:
             self._polish(upto, self._in_order(upto, NONE)[0][0])
         else:
             draws, least = self._in_order(upto, self.objective.discrepancy)
-            if self.best.rss - least > CHANCE * TOLD_APART * self.best.rss / self.best.count:
+            if self.best.rss - least > CHANCE * TOLD_APART * self.best.left:
                 self._polish(upto, draws[0])
         truer = self._truer()
         if truer is not self.noise:

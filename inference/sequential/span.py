@@ -64,7 +64,9 @@ class Span:
         best = self._coordinates(self._takes.clean(predicted))
         off = self._coordinates(self._takes.measured()) - best
         most = np.quantile(np.linalg.norm(self._coordinates(flawed) - self._draws, axis=-1), USUAL)
-        return self._at(best + off * min(1.0, most / max(float(np.linalg.norm(off)), most)), self._takes.measured())
+        if (far := float(np.linalg.norm(off))) > most:
+            off *= most / far
+        return self._at(best + off, self._takes.measured())
 
     def _coordinates(self, seen: Sequence[FloatArray]) -> FloatArray:
         return np.asarray((self._flat(seen) - self._mean) @ self._basis)

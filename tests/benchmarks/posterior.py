@@ -5,7 +5,7 @@ and the model is right. Printed by number of parameters: simulations, seconds, h
 best fit's ± (the median over parameters and cases), how often its 90 % intervals hold the truth, and how far the
 predictions of its draws lie from the motion itself, on a recording that was fitted and on one that was not::
 
-    python tests/benchmarks/posterior.py --parameters 2 4 8 --cases 6
+    python tests/benchmarks/posterior.py --parameters 2 4 8 --cases 4
 """
 
 import argparse
@@ -121,7 +121,7 @@ def case(parameters: int, seed: int, estimator: str, folder: Path) -> dict[str, 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parameters", type=int, nargs="+", default=[2, 4, 8], choices=list(EFFECTS))
-    parser.add_argument("--cases", type=int, default=6, help="seeds 0, 1, ...")
+    parser.add_argument("--cases", type=int, default=4, help="seeds 0, 1, ...")
     parser.add_argument("--estimator", default="npe-rkhs")
     parser.add_argument("--output", type=Path, default=Path("results/posterior.json"))
     given = parser.parse_args()

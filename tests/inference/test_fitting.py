@@ -14,14 +14,16 @@ import xarray
 import zarr
 from small import TRUTH, small_measurement, write_study
 
+from muslin.core.arrays import FloatArray
 from muslin.core.errors import InputError, MuslinError, StepMissingError, StoreError
 from muslin.core.measurement import Measurement
 from muslin.core.measurement_store import save_measurement
 from muslin.core.registry import REGISTRY
 from muslin.core.store import read
 from muslin.core.study import Study, read_config, write_config
+from muslin.core.study.config import ParameterTable
 from muslin.inference.criticism import compare as comparing
-from muslin.inference.polish import Objective, Polished
+from muslin.inference.polish import Objective, Polished, polish
 from muslin.inference.sequential import fitting, polishing
 from muslin.inference.sequential.only_one import only_one
 
@@ -56,6 +58,36 @@ def test_what_a_model_misses_makes_its_posterior_as_much_wider(tmp_path: Path) -
     assert result.left > 4.0 and "times the squares that noise leaves" in result.text()
     width = result.samples.std(axis=0) / result.sd
     assert np.all((width > 0.5) & (width < 2.0)), width
+
+
+@pytest.mark.parametrize("rested", [True, False])
+def test_a_search_that_ends_in_a_wrong_place_is_not_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rested: bool
+) -> None:
+    """One that believes to rest is helped by what all draws tell, one that knows better goes on."""
+    real, calls = polishing.polish_from, []
+
+    def stuck(objective: Objective, starts: FloatArray, best: Polished | None = None) -> Polished:
+        calls.append(best)
+        if best is not None and rested:
+            return real(objective, starts, best)
+        return best or replace(polish(objective, np.array([0.95, 0.05]), 0), rested=rested)
+
+    monkeypatch.setattr(polishing, "polish_from", stuck)
+    result = Study.load(write_study(tmp_path, small_measurement()), workers=0).fit()
+    assert result.left < 1.2
+    assert result.values()["stretch_stiffness"] == pytest.approx(TRUTH.stretch_stiffness, rel=0.05)
+    assert (calls[-1] is not None) == rested
+
+
+def test_a_parameter_that_does_nothing_is_left_as_wide_as_its_prior(tmp_path: Path) -> None:
+    path = write_study(tmp_path, small_measurement())
+    config = read_config(path)
+    config.parameters = {"friction": ParameterTable(low=0.1, high=1.0)}
+    config.material = {"stretch_stiffness": TRUTH.stretch_stiffness, "bending_rigidity": TRUTH.bending_rigidity}
+    write_config(config, path)
+    result = Study.load(path, workers=0).fit()
+    assert result.samples.std() == pytest.approx(0.9 / 12**0.5, rel=0.3)
 
 
 def test_with_tails_what_goes_another_way_does_not_lead_the_fit(

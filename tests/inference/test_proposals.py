@@ -9,6 +9,7 @@ from muslin.core.study import parse_config
 from muslin.inference.estimators.bayessim_rkhs import BayesSimRKHS
 from muslin.inference.posterior.mixture import MixturePosterior
 from muslin.inference.sequential.division import around, divide
+from muslin.inference.sequential.ellipsoid import Ellipsoid
 from muslin.inference.sequential.proposals import Density, Kind, Proposal, Proposals
 from muslin.inference.sequential.region import TAIL, Region
 from muslin.inference.sequential.success import Success
@@ -156,6 +157,24 @@ def test_truncated_rounds_close_in_on_the_exact_posterior() -> None:
         proposals.add(posterior, theta, np.zeros(len(theta), bool))
     print("KL(exact || learned) after each round:", np.round(divergence, 2))
     assert divergence[-1] < 0.6 * divergence[0]
+
+
+def test_a_posterior_at_the_rim_of_what_was_drawn_is_told() -> None:
+    rng = np.random.default_rng(0)
+    inside = np.clip(0.4 + 0.02 * rng.standard_normal((4000, 2)), 0.0, 1.0)
+    proposals = Proposals("truncated", 2, 0)
+    theta, none = proposals.draw(50), np.zeros(50, bool)
+    assert proposals.at_the_rim(inside, 2) == []  # the first round draws from all of the prior
+    proposals.add(NARROW, theta, none, Ellipsoid.around(inside, rng))
+    drawn = proposals.draw(200)
+    assert (proposals.region.out(drawn) <= 1.0).all()  # type: ignore[union-attr]
+    assert proposals.counting(np.concatenate([theta, drawn])) < 250  # those outside weigh nothing
+    assert proposals.at_the_rim(inside, 2) == []
+    (told,) = proposals.at_the_rim(inside + 0.08, 2)
+    assert "rounds = 3" in told
+    proposals.add(NARROW, drawn, np.zeros(200, bool))  # it goes on around the posterior
+    held = proposals.region.out(NARROW.sample(2000, rng)) <= 1.0  # type: ignore[union-attr]
+    assert held.mean() > 0.99
 
 
 def test_division_by_a_gaussian_undoes_learning_under_it() -> None:
