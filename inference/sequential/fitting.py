@@ -67,8 +67,10 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
                 )
                 guess = learner.learn(takes_of(study, polishing.noise), [], theta, points, numbers, proposals, k)
                 polishing.look_from(guess.sample(GUESSES, np.random.default_rng([seed, 4049])))
-            first = k == 0 < rounds - 1 and proposals.kind == "truncated"
-            within = polishing.narrowed(upto, np.random.default_rng([seed, 4051])) if first else None
+            within = None
+            if k == 0 < rounds - 1 and proposals.kind == "truncated":
+                study.progress(f"round {k + 1} of {rounds}: looking where the posterior ends", 0, 0)
+                within = polishing.narrowed(upto, np.random.default_rng([seed, 4051]))
             posterior: Posterior
             if within is not None:
                 posterior = cube_gaussian(polishing.best.unit, polishing.best.widened)

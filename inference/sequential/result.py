@@ -87,9 +87,10 @@ class FitResult:
                 f"posterior {mean[k]:.4g} ± {spread[k]:.2g}{unit}"
             )
         if self.left > _MUCH:
+            times = f"{self.left:.0f}" if self.left >= 10.0 else f"{self.left:.2g}"
             lines.append(
-                f"  the best fit leaves {self.left:.2g} times the squares that noise leaves: ± and the posterior take "
-                "what is more for noise; muslin compare says where it is"
+                f"  the best fit leaves {times} times the squares that noise leaves: ± and the posterior take what is "
+                "more for noise; muslin compare says where it is"
             )
         lines += self._explained(mean, spread)
         size, unit = (self.noise.sd * 1e3, "mm") if self.noise.unit == "m" else (self.noise.sd, self.noise.unit)

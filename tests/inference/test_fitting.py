@@ -60,6 +60,14 @@ def test_what_a_model_misses_makes_its_posterior_as_much_wider(tmp_path: Path) -
     assert np.all((width > 0.5) & (width < 2.0)), width
 
 
+def test_a_misfit_does_not_lead_the_posterior_astray(tmp_path: Path) -> None:
+    """Seen as it is, what this model misses takes the estimator 36 standard deviations away from the best fit."""
+    tilt = REGISTRY.get("effect", "gravity-tilt")(about_x=0.03, about_y=0.0)
+    result = Study.load(write_study(tmp_path, small_measurement(tilt, seed=1)), workers=0).fit()
+    assert result.left > 4.0
+    assert np.all(np.abs(result.samples.mean(axis=0) - result.estimate) < 12.0 * result.sd)
+
+
 @pytest.mark.parametrize("rested", [True, False])
 def test_a_search_that_ends_in_a_wrong_place_is_not_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rested: bool
