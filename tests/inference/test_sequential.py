@@ -133,6 +133,20 @@ def test_noise_falls_with_the_root_of_the_takes_and_gaps_are_filled_by_other_tak
     assert (np.isnan(flawed[0]) == np.isnan(seen)).all()
 
 
+def test_what_no_take_measures_is_nothing_in_draws_with_and_without_flaws(tmp_path: Path) -> None:
+    measurement = takes_of(small_measurement(noise=0.0), 2, 0.001)
+    for r in measurement.recordings:
+        r.series.points[..., 1] = np.nan
+    study = Study.load(write_study(tmp_path, small_measurement(noise=0.0), hold_out=[]), workers=0)
+    observer = Observer(list(measurement.recordings), Noise(0.001, 0.0, "test", "m", 0.01), Offsets())
+    scenarios = {r.name: study.problem.scenarios["far" if r.name == "far" else "near"] for r in measurement.recordings}
+    takes = Takes(observer, scenarios)
+    draws = [np.ones((3, *m.shape)) for m in takes.measured()]
+    for clean, seen in zip(takes.clean(draws), takes.observe([draws[0], draws[1]], np.arange(3), 0), strict=True):
+        assert (clean[..., 1] == 0.0).all() and (seen[..., 1] == 0.0).all()
+        assert (clean[..., [0, 2]] == 1.0).all() and (seen[..., [0, 2]] != 0.0).all()
+
+
 def test_unordered_takes_are_one_larger_set(tmp_path: Path) -> None:
     measurement = takes_of(small_measurement(noise=0.0), 3, 0.001)
     unordered = Measurement(
