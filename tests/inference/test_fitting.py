@@ -24,7 +24,7 @@ from muslin.core.study import Study, read_config, write_config
 from muslin.core.study.config import ParameterTable
 from muslin.inference.criticism import compare as comparing
 from muslin.inference.polish import Objective, Polished, polish
-from muslin.inference.sequential import fitting, polishing
+from muslin.inference.sequential import fitting, polishing, proposals
 from muslin.inference.sequential.only_one import only_one
 
 pytest.importorskip("mujoco")
@@ -66,6 +66,14 @@ def test_a_misfit_does_not_lead_the_posterior_astray(tmp_path: Path) -> None:
     result = Study.load(write_study(tmp_path, small_measurement(tilt, seed=1)), workers=0).fit()
     assert result.left > 4.0
     assert np.all(np.abs(result.samples.mean(axis=0) - result.estimate) < 12.0 * result.sd)
+
+
+def test_a_posterior_that_reaches_the_end_of_where_draws_came_from_is_told_so(
+    small_study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proposals, "WIDER", 1e6)  # what is drawn from ends right around the best fit
+    result = small_study.fit()
+    assert "another round looks there: [estimator] rounds = 3" in " ".join(result.warnings)
 
 
 @pytest.mark.parametrize("rested", [True, False])

@@ -1,5 +1,7 @@
 """Least squares over a simulator that sometimes fails: what is not known stays as wide as the prior."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -30,6 +32,16 @@ def test_the_minimum_and_its_covariance() -> None:
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
     matrix = Linear(2.0).matrix
     np.testing.assert_allclose(best.covariance, np.linalg.inv(matrix.T @ matrix + 12 * np.eye(2)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("left", [0.5, 9.0, 1e6])
+def test_what_is_left_beyond_noise_counts_as_noise_and_never_as_less_than_the_prior_knows(left: float) -> None:
+    best = polish(Linear(2.0), np.array([0.1, 0.1]))
+    matrix = Linear(2.0).matrix
+    of_data = matrix.T @ matrix / max(1.0, left)  # as though noise were so much louder
+    told = replace(best, white=np.full(40, np.sqrt(left)), count=40.0).widened
+    np.testing.assert_allclose(told, np.linalg.inv(of_data + 12 * np.eye(2)), rtol=1e-6)
+    assert np.linalg.eigvalsh(told).max() <= 1 / 12
 
 
 def test_whether_more_evaluations_would_gain_anything_is_told() -> None:
