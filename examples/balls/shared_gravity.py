@@ -17,8 +17,8 @@ from demo import DEMO, muslin, title
 HERE = Path(__file__).resolve().parent
 BALLS = ("bowling", "golf", "tennis", "volleyball", "whiffle")
 LAWS = ("viscous-damping", "air-drag")
-#: A study of a ball has 40, which is little for gravity beside drag.
-DRAWS = 200
+#: Of a round. A study of a ball has 20, which is little for gravity beside drag.
+DRAWS = 100
 #: Wide enough for all falls under either law of drag.
 GRAVITY = """
 [effects.gravity-strength.excess]  # beyond 9.80665 m/s2
@@ -29,7 +29,7 @@ high = 6.0
 
 def fitted(ball: str, law: str, folder: Path) -> str:
     """Name of the study of one ball with gravity and one law of drag inferred, fitted."""
-    text = (HERE / f"{ball}.toml").read_text().replace("draws = 40", f"draws = {DRAWS}")
+    text = (HERE / f"{ball}.toml").read_text().replace("draws = 20", f"draws = {DRAWS}")
     (folder / f"{ball}.toml").write_text(text + GRAVITY)
     shutil.copy(HERE / f"{ball}.vtk", folder)
     name = f"{law}-{ball}.toml"
