@@ -34,6 +34,7 @@ class Candidate:
         approached: the curvature is of a search from near here rather than of the first look.
         refitted: polished to the end, so what it leaves is what it cannot explain.
         tried: simulated beyond its first look, or it moves nothing; else nothing is known of what it explains.
+        doubt: how far off parameters and coefficients may be beside their covariance, as standard deviations ``(D,)``.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Candidate:
     approached: bool = False
     refitted: bool = False
     tried: bool = False
+    doubt: FloatArray | None = None
 
     @property
     def rss(self) -> float:
@@ -66,7 +68,8 @@ class Candidate:
         """The same for any effect in the model."""
         low = np.array([p.low for p in self.space])
         span = np.array([p.high for p in self.space]) - low
-        sd = np.sqrt(np.diag(self.fit.widened))
+        doubt = np.zeros(len(low)) if self.doubt is None else self.doubt
+        sd = np.sqrt(np.diag(self.fit.widened) + doubt**2)
         return {
             p.name.split(".", 1)[1]: (float(low[k] + span[k] * self.fit.unit[k]), float(span[k] * sd[k]), p.unit)
             for k, p in enumerate(self.space)

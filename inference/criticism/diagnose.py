@@ -72,10 +72,10 @@ def diagnose(study: Study) -> Diagnosis:
 
 
 def _surely(work: Work, found: Findings) -> dict[str, Candidate]:
-    """The models whose coefficients are told, by effect, with what is known of them where chance moves them, too."""
+    """The models whose coefficients are told, by effect, with what is known of them."""
     if found.verdict == "named":
-        return dict.fromkeys(found.effects, work.past_chance(found.after))
-    return {n: work.past_chance(found.first.candidate(n)) for n in found.effects}
+        return dict.fromkeys(found.effects, work.told(found.after))
+    return {n: work.told(found.first.candidate(n)) for n in found.effects}
 
 
 def _fitted(study: Study) -> FloatArray:

@@ -9,7 +9,7 @@ from ...core.arrays import FloatArray
 from ...core.parameters import ParameterSpace
 from ...core.study import Problem, SimulationPool, Study
 from ..discrepancy import Discrepancy
-from ..polish import Objective, Polished, polish
+from ..polish import MISFIT, Objective, Polished, polish
 from ..residuals import Residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
@@ -61,6 +61,7 @@ class Work:
         self.rough = Roughness({}, {}, {})
         self.moved: dict[str, float] = {}
         self._elsewhere = 0  # rollouts of other engines and meshes
+        self._as_fitted: dict[tuple[object, ...], FloatArray] = {}
         self._held_out: dict[tuple[tuple[str, float], ...], dict[str, Residual | None]] = {}
 
     @property
@@ -119,11 +120,14 @@ class Work:
         """
         if not self.discrepancy.directions:
             return candidate.fit.unit
-        objective = Objective(
-            self.pool, candidate.space, self.problem.fit_on, self.fit.noise, self.offsets,
-            discrepancy=replace(self.discrepancy, directions={}),
-        )  # fmt: skip
-        return polish(objective, candidate.fit.unit, USER_EVALUATIONS).unit
+        key = (*candidate.space.names, candidate.fit.unit.tobytes())
+        if key not in self._as_fitted:
+            objective = Objective(
+                self.pool, candidate.space, self.problem.fit_on, self.fit.noise, self.offsets,
+                discrepancy=replace(self.discrepancy, directions={}),
+            )  # fmt: skip
+            self._as_fitted[key] = polish(objective, candidate.fit.unit, USER_EVALUATIONS).unit
+        return self._as_fitted[key]
 
     def roughly_polished(
         self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None
@@ -162,11 +166,20 @@ class Work:
         has = set(self.problem.space.names)
         return tuple(dict.fromkeys(n.split(".", 1)[0] for n in candidate.space.names if "." in n and n not in has))
 
-    def past_chance(self, candidate: Candidate) -> Candidate:
-        """With a covariance that holds where the model cannot be repeated, too."""
+    def told(self, candidate: Candidate) -> Candidate:
+        """With what is known of its coefficients where chance moves them, and where a misfit stays.
+
+        A misfit that stays beside what numerics may be off by is not like these, so what they take off may not be right
+        either. How far the fit goes if they take off nothing counts as doubt, by the share of what is left that is no
+        noise: a right model goes no farther than its covariance says (Hausman, *Specification tests*, 1978).
+        """
         effects = self._effects_of(candidate)
         seen = seen_past_chance(self.objective(effects), self._again(effects, candidate.fit))
-        return replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
+        candidate = replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
+        if candidate.fit.left < MISFIT:
+            return candidate
+        share = 1.0 - 1.0 / candidate.fit.left
+        return replace(candidate, doubt=np.sqrt(share) * (self.as_a_user_fits(candidate) - candidate.fit.unit))
 
     def _again(self, effects: tuple[str, ...], fit: Polished) -> Polished:
         """The same point with residuals that are whitened as they are now."""

@@ -34,7 +34,7 @@ class Pool:
     problem = SimpleNamespace(recordings={"r": Recording("r", PointSeries(TIME, BEST * WAVE + 0.2 * OTHER))})
 
     def map(self, tasks: list[SimpleNamespace]) -> list[Trajectory]:
-        made = [PointSeries(TIME, task.values["a"] * WAVE) for task in tasks]
+        made = [PointSeries(TIME, sum(task.values.values()) * WAVE) for task in tasks]
         return [Trajectory(series, series.points, np.zeros((len(TIME), 1, 7))) for series in made]
 
 
@@ -44,7 +44,7 @@ def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
     numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
     work = SimpleNamespace(
         pool=pool, problem=SimpleNamespace(fit_on=("r",)), fit=SimpleNamespace(noise=NOISE), offsets=Offsets(),
-        discrepancy=numerics,
+        discrepancy=numerics, _as_fitted={},
     )  # fmt: skip
     beside = polish(Objective(pool, SPACE, ("r",), NOISE, Offsets(), discrepancy=numerics), np.array([0.8]), 8)  # type: ignore[arg-type]
     assert abs(beside.unit[0] - BEST) > 0.1
@@ -54,6 +54,32 @@ def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
     np.testing.assert_allclose(Work.as_a_user_fits(work, found), [plain.unit[0]], atol=1e-3)  # type: ignore[arg-type]
     work.discrepancy = Discrepancy()
     np.testing.assert_array_equal(Work.as_a_user_fits(work, found), beside.unit)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("misfit", [0.0, 0.2])
+def test_a_misfit_that_numerics_do_not_explain_casts_doubt_on_what_they_take_off(misfit: float) -> None:
+    """Doubt goes as far as the fit goes without them, where what is left is no noise."""
+    aside = np.array([0.0, 0.05, 0.0])  # what nothing explains
+    noise = 0.001 * np.random.default_rng(0).normal(size=WAVE.shape)
+    seen = Recording("r", PointSeries(TIME, BEST * WAVE + misfit * (OTHER + aside) + noise))
+    pool = SimpleNamespace(problem=SimpleNamespace(recordings={"r": seen}), map=Pool().map)
+    space = ParameterSpace((Parameter("drag.a", "1", 0.0, 1.0),))
+    numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
+    work = SimpleNamespace(
+        pool=pool, problem=SimpleNamespace(fit_on=("r",)), fit=SimpleNamespace(noise=NOISE), offsets=Offsets(),
+        discrepancy=numerics, _as_fitted={}, _effects_of=lambda candidate: (),
+        objective=lambda effects: Objective(pool, space, ("r",), NOISE, Offsets(), discrepancy=numerics),  # type: ignore[arg-type]
+    )  # fmt: skip
+    work._again, work.as_a_user_fits = partial(Work._again, work), partial(Work.as_a_user_fits, work)
+    found = candidate("drag", 1.0)
+    found.__dict__.update(space=space, base=0, fit=polish(work.objective(()), np.array([0.8]), 8))
+    mean, sd, _ = Work.told(work, found).coefficients["a"]  # type: ignore[arg-type]
+    if misfit:
+        assert found.fit.left > 20.0 and abs(mean - BEST) > 0.1
+        plain = polish(Objective(pool, space, ("r",), NOISE, Offsets()), np.array([0.8]), 8)  # type: ignore[arg-type]
+        assert sd == pytest.approx(abs(mean - plain.unit[0]), rel=0.05)
+    else:
+        assert sd == found.coefficients["a"][1] and abs(mean - BEST) < 3 * sd
 
 
 @pytest.mark.parametrize("ar1", [0.0, 0.5])
