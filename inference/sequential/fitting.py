@@ -136,6 +136,8 @@ def _too_many_failed(store: DrawStore, space: ParameterSpace) -> MuslinError:
     where, reasons = region_text(space, theta, failed), store.failures()
     store.forget_failures()  # what made them fail may be mended where the fingerprint of the study does not see it
     advice = "Narrow the priors in [parameters], lower [simulator] time_step or raise [study] time_limit"
+    if failed.mean() < 0.5:
+        advice = f"At least {MIN_DRAWS} draws that count are needed in every round: raise [estimator] draws"
     if any("in a plugin" in r for r in reasons):
         advice = "An effect, extractor or simulator of the study is at fault: mend it (muslin check NAME)"
     return MuslinError(

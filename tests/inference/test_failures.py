@@ -77,6 +77,13 @@ def test_when_all_draws_fail_the_reasons_are_the_error(
         study(tmp_path, limit, **keys).fit()
 
 
+def test_where_a_few_of_a_few_draws_fail_more_draws_are_asked_for(brittle: None, tmp_path: Path) -> None:
+    made = study(tmp_path, 1000.0)
+    made.config.estimator.draws = 10
+    with pytest.raises(MuslinError, match=r"[1-4] of 10 draws .* At least 10 .* raise \[estimator\] draws"):
+        made.fit()
+
+
 def test_a_hopeless_first_round_is_not_simulated_to_its_end(brittle: None, tmp_path: Path) -> None:
     made = study(tmp_path, 1.0)
     made.config.estimator.draws = 500
