@@ -3,8 +3,8 @@
 import json
 from typing import Any
 
-from effects_bench.table import shown
-from table import RESULTS, row
+from effects_batches import together
+from table import RESULTS
 
 SIMULATORS = ("mujoco", "pybullet")
 
@@ -22,23 +22,6 @@ def hidden_effects() -> list[str]:
         says = verdict if effects == "-" else f"{verdict}: `{effects}`"
         before, after = (rows[f"hidden {hidden}: held-out error {when}"] for when in ("before", "after"))
         lines.append(f"| {hidden if hidden == 'none' else f'`{hidden}`'} | {says} | {before:.1f} → {after:.1f} |")
-    return lines
-
-
-def wider() -> list[str]:
-    """The benchmark of hidden effects on its test seeds: every figure that has a bar, beside what baselines reach."""
-    content = json.loads((RESULTS / "effects.json").read_text())
-    asked = [f for f in content["figures"] if f["bar"] and f["count"]]
-    rivals = list(dict.fromkeys(name for f in asked for name in f["rivals"] or ()))
-    heads = ["on the test seeds", "value", "cases", "95 % interval", "bar", *(f"`{name}`" for name in rivals)]
-    lines = [row(heads), "|---" * len(heads) + "|"]
-    for f in asked:
-        is_share = f["low"] is not None
-        interval = f"{100 * f['low']:.1f} to {100 * f['high']:.1f} %" if is_share else ""
-        met = "met" if f["met"] else "**missed**"
-        theirs = [shown((f["rivals"] or {}).get(name), is_share) for name in rivals]
-        cells = [f["name"], shown(f["value"], is_share), str(f["count"]), interval, f"{f['bar']}, {met}", *theirs]
-        lines.append(row(cells))
     return lines
 
 
@@ -96,7 +79,9 @@ def _millimetres(length: float) -> str:
 
 
 def main() -> None:
-    print("\n\n".join("\n".join(t) for t in (hidden_effects(), wider(), materials(), posteriors(), real_recordings())))
+    print(
+        "\n\n".join("\n".join(t) for t in (hidden_effects(), together(), materials(), posteriors(), real_recordings()))
+    )
 
 
 if __name__ == "__main__":
