@@ -30,6 +30,7 @@ class Candidate:
         held_out_white: mean square of all of them, whitened by noise and numerics [noise variances].
         held_out_shift: how far it is on held-out recordings from the model without it, as a sum of squares [noise
             variances].
+        held_out_gain: by how much -2 log likelihood of these falls with it.
         promised: residual sum of squares that a linear model promised at the first look.
         approached: the curvature is of a search from near here rather than of the first look.
         refitted: polished to the end, so what it leaves is what it cannot explain.
@@ -44,6 +45,7 @@ class Candidate:
     held_out: dict[str, float] = field(default_factory=dict)
     held_out_white: float = float("nan")
     held_out_shift: float = float("inf")
+    held_out_gain: float = 0.0
     promised: float = float("inf")
     approached: bool = False
     refitted: bool = False

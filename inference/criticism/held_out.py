@@ -48,6 +48,12 @@ class HeldOut:
             return float("inf")
         return float(np.sum((self.white - other.white) ** 2))
 
+    def gain(self, other: "HeldOut") -> float:
+        """By how much -2 log likelihood is less than of another model there; zero where one has no residuals."""
+        if self.white is None or other.white is None:
+            return 0.0
+        return float(other.white @ other.white - self.white @ self.white)
+
 
 def held_out_residuals(
     pool: SimulationPool, problem: Problem, space: ParameterSpace, unit: FloatArray, noise: Noise, offsets: Offsets

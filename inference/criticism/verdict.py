@@ -196,5 +196,10 @@ def _moved(candidate: Candidate) -> bool:
 
 
 def _clear_gain(e: Evidence, candidate: Candidate) -> bool:
-    """A gain so significant that it is a misfit, though the total is within what the noise may be."""
-    return bool(e.z(candidate) > 2 * SIGNIFICANT and not np.isnan(e.held_out_plain))
+    """A gain that is a misfit, though the total is within what the noise may be.
+
+    It is one where it is significant enough by itself, or where motions that were not fitted bear it out by as much as
+    a rival is held off by. Either is a difference of two sums, which how large the noise is changes by little.
+    """
+    beyond_doubt = e.z(candidate) > 2 * SIGNIFICANT or candidate.held_out_gain > MARGIN
+    return beyond_doubt and not np.isnan(e.held_out_plain)

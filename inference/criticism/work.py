@@ -195,8 +195,10 @@ class Work:
             plain: the model without it on the held-out recordings; left out, these count as ones that would show it.
         """
         held = self.held_out(candidate.space, candidate.fit.unit)
-        shift = float("inf") if plain is None else held.shift(plain)
-        return replace(candidate, held_out=held.errors, held_out_white=held.mean_square, held_out_shift=shift)
+        shift, gain = (float("inf"), 0.0) if plain is None else (held.shift(plain), held.gain(plain))
+        return replace(
+            candidate, held_out=held.errors, held_out_white=held.mean_square, held_out_shift=shift, held_out_gain=gain
+        )
 
     def held_out(self, space: ParameterSpace, unit: FloatArray) -> HeldOut:
         """A point of a space on the held-out recordings. Each point is simulated once."""

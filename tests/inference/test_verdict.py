@@ -8,7 +8,7 @@ import pytest
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.criticism.candidate import Candidate, screening_points, z_value
 from muslin.inference.criticism.held_out import HeldOut
-from muslin.inference.criticism.verdict import MARGIN, SHARE_LEFT, Decision, Evidence, decide, objection
+from muslin.inference.criticism.verdict import MARGIN, SHARE_LEFT, Decision, Evidence, decide, has_misfit, objection
 from muslin.inference.polish import Polished
 
 COUNT = 3000.0
@@ -129,10 +129,25 @@ def test_what_two_models_differ_by_on_held_out_motions() -> None:
     a = rng.normal(size=400)
     one, two = (HeldOut({"other": 0.003}, w, information=0.5, dropped=0) for w in (a, a + 0.1))
     assert one.shift(two) == pytest.approx(400 * 0.01)  # the residuals are worth as much as they are
+    assert one.gain(two) == pytest.approx(float((a + 0.1) @ (a + 0.1) - a @ a)) == -two.gain(one)
     assert one.mean_square == pytest.approx(float(a @ a) / 200)
     assert HeldOut({"other": np.inf}, None, 1.0, 0).shift(one) == np.inf
+    assert HeldOut({"other": np.inf}, None, 1.0, 0).gain(one) == 0.0
     assert HeldOut({"other": np.inf}, None, 1.0, 0).mean_square == np.inf
     assert np.isnan(HeldOut({}, None, 1.0, 0).mean_square)
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(0.0, "no-misfit"), (MARGIN - 1, "no-misfit"), (MARGIN + 1, "named")])
+def test_a_weak_effect_is_named_if_motions_that_were_not_fitted_bear_it_out(gain: float, verdict: str) -> None:
+    """The total is within what the noise may be, and the gain significant, but not beyond doubt by itself."""
+    weak = replace(candidate("wind", COUNT - 40, held_out=0.0029), held_out_gain=gain)
+    e = evidence(COUNT + 10, weak, held_out=0.003)
+    assert not has_misfit(e) and 4.0 < e.z(weak) < 8.0
+    assert decide(e).verdict == verdict
+    nothing_held_out = evidence(COUNT + 10, weak, held_out=np.nan)
+    assert decide(nothing_held_out).verdict == "no-misfit"
+    worse = replace(weak, held_out_white=1.1)
+    assert decide(evidence(COUNT + 10, worse, held_out=0.003)).verdict == "no-misfit"
 
 
 def test_not_named_when_the_coefficient_may_be_zero() -> None:
