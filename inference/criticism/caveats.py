@@ -10,6 +10,19 @@ _FINER = {"step": "lower [simulator] time_step", "mesh": "raise [scenario] verti
 ELSEWHERE = 1.5
 
 
+def small(result: dict[str, Any]) -> str:
+    """That what is missing hides behind the noise, though it is there."""
+    if result["verdict"] not in ("named", "tied") or result["evidence"]["beyond_noise"]:
+        return ""
+    best = next(c for c in result["candidates"] if c["name"] == result["effects"][0])
+    borne_out = result["error"]["held_out"] and result["error"]["after"] < result["error"]["before"]
+    return (
+        f"It is small: without it the model is within what noise may leave in all; but what {best['name']} takes away "
+        f"is beyond chance ({best['z']:.0f} standard deviations)"
+        + (", and motions that were not fitted bear it out." if borne_out else ".")
+    )
+
+
 def further(result: dict[str, Any]) -> str:
     """That one of several effects is missing beside those that were named, or one beside any of several."""
     several = result["further"]

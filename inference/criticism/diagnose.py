@@ -16,7 +16,7 @@ from .candidate_names import candidate_names
 from .sentences import explain, told
 from .stepwise import Findings, borne_out, confirmed, find
 from .told import Told
-from .verdict import Evidence
+from .verdict import Evidence, has_misfit
 from .where import where_it_is
 from .work import Work
 
@@ -179,6 +179,7 @@ def _result(
         },
         "evidence": {
             "misfit": joint.rss_plain / joint.count,
+            "beyond_noise": has_misfit(e),
             "misfit_after": after.rss / joint.count,
             "held_out": joint.held_out_white if held else None,
             "explained": joint.explained(after),

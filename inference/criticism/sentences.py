@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.effect import Effect
 from ...core.study import Study
-from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, unrepeatable, untried
+from .caveats import budget, elsewhere, further, invisible, length, numerics, rest, small, unrepeatable, untried
 from .verdict import EXPLAINS, MARGIN
 
 #: Candidates that explain at least this share are told one by one.
@@ -27,6 +27,7 @@ def told(study: Study, result: dict[str, Any], effects: dict[str, type[Effect]])
     """
     parts = {
         "verdict": _verdict(result, effects),
+        "small": small(result),
         "further": further(result),
         "rest": rest(result),
         "budget": budget(result),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest, untried
+from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest, small, untried
 from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
 
@@ -58,6 +58,19 @@ def test_an_error_that_nobody_knows_is_told_as_such() -> None:
     named = {"verdict": "named", "effects": ["drag"], "error": error, "evidence": evidence, "candidates": [row]}
     told = _verdict(named, {"drag": SimpleNamespace(symptom="moves too fast")})  # type: ignore[dict-item]
     assert "held-out error not known (one of the two models cannot be simulated there), noise 3.0 mm" in told
+
+
+def test_what_hides_behind_the_noise_is_told_to_be_small() -> None:
+    error = {"held_out": True, "before": 0.0032, "after": 0.0030}
+    rows = [{"name": "wind", "z": 7.8}, {"name": "tilt", "z": 7.7}]
+    tied = {"verdict": "tied", "effects": ["wind", "tilt"], "candidates": rows, "error": error}
+    within, beyond = {"evidence": {"beyond_noise": False}}, {"evidence": {"beyond_noise": True}}
+    told = small(tied | within)
+    assert "wind takes away is beyond chance (8 standard deviations), and motions that were not fitted" in told
+    assert "bear it out" not in small(tied | within | {"error": error | {"after": 0.0033}})
+    assert "bear it out" not in small(tied | within | {"error": error | {"held_out": False}})
+    assert not small(tied | beyond)
+    assert not small(tied | within | {"verdict": "no-misfit", "effects": []})
 
 
 @pytest.mark.parametrize("explained, part", [(0.36, True), (0.1, False)])
