@@ -1,7 +1,7 @@
 """Five balls, one gravity: do their falls agree on how strong it is, under a linear and under a quadratic law of drag?
 
 Every ball keeps a drag of its own; gravity is inferred beside it, from the first drop, and what the five tell is held
-together. Runs the commands that a user would type, in ``demo/shared_gravity``, and prints each before it runs; three
+together. Runs the commands that a user would type, in ``demo/shared_gravity``, and prints each before it runs; four
 minutes on two cores::
 
     python examples/balls/shared_gravity.py
