@@ -7,8 +7,6 @@ of the next. ::
 """
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from effects_bench.scoring import wilson
@@ -76,20 +74,15 @@ def _against(bar: str, value: float) -> str:
     return f"{bar}, {'met' if met else '**missed**'}"
 
 
-def _contents() -> Iterator[dict[str, Any]]:
+def _contents() -> list[dict[str, Any]]:
     """What was written of every batch, in the order of their seeds."""
-    for path in sorted(RESULTS.glob("effects*.json"), key=_first_seed):
-        if path.stem != "effects-baselines":  # what other methods make of cases of the first batch
-            yield json.loads(path.read_text(encoding="utf-8"))
+    paths = [p for p in RESULTS.glob("effects*.json") if p.stem != "effects-baselines"]  # these are of the first batch
+    return sorted((json.loads(p.read_text(encoding="utf-8")) for p in paths), key=lambda content: content["seeds"][0])
 
 
 def _larger(cases: list[dict[str, Any]]) -> str:
     errors = [c["error"] for c in cases if c.get("verdict") in ("named", "tied")]
     return f"{sum(e['after'] > e['before'] for e in errors)} of {len(errors)}"
-
-
-def _first_seed(path: Path) -> int:
-    return int(json.loads(path.read_text(encoding="utf-8"))["seeds"][0])
 
 
 def _share(figure: dict[str, Any]) -> str:

@@ -62,6 +62,7 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     assert diagnosis.result["effects"] == ["air-drag"]
     assert next(iter(diagnosis.result["told"])) == "verdict"
     assert "where" in diagnosis.result["told"]
+    assert diagnosis.result["evidence"]["beyond_noise"] and "small" not in diagnosis.result["told"]
     assert diagnosis.result["candidates"][0]["objection"] is None
     assert study.step_results("diagnose").attrs["models"][0]["effects"] == ["air-drag"]
     drag = diagnosis.result["candidates"][0]["coefficients"]["drag_coefficient"]

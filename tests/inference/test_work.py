@@ -99,3 +99,6 @@ def test_evidence_says_whether_held_out_motions_would_show_a_candidate(ar1: floa
     expected = [worth * float(np.sum((m * WAVE) ** 2)) / noise.sd**2 for m in moved]
     np.testing.assert_allclose([c.held_out_shift for c in found], expected, rtol=1e-6)
     assert [c.shown_held_out for c in found] == [False, True]
+    squares = [np.sum(((BEST - plain.unit[0] - m) * WAVE + 0.2 * OTHER) ** 2) for m in (0.0, *moved)]
+    gains = [worth * (squares[0] - after) / noise.sd**2 for after in squares[1:]]
+    np.testing.assert_allclose([c.held_out_gain for c in found], gains, rtol=1e-6)
