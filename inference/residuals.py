@@ -37,11 +37,21 @@ class Residual:
         white: the same in units of the noise ``(N,)``, see :func:`_weighted`, and one number for each
             offset under its prior; its sum of squares is minus twice the log posterior.
         clock: offset of the measurement's clock that was taken out [s].
+        constant: offset of the measured points that was taken out ``(A,)`` [unit]; 0 where none was.
     """
 
     difference: FloatArray
     white: FloatArray
     clock: float = 0.0
+    constant: FloatArray | float = 0.0
+
+    def recorded(self, time: FloatArray, predicted: FloatArray) -> FloatArray:
+        """Predicted points ``(T, ..., A)`` at ``time (T,)`` [s] when and where the recording would show them."""
+        return self.late(time, predicted) + self.constant
+
+    def late(self, time: FloatArray, predicted: FloatArray) -> FloatArray:
+        """What is predicted ``(T, ...)`` at ``time (T,)`` [s], when the recording would show it."""
+        return interpolate(time + self.clock, time, predicted)
 
     @property
     def rms(self) -> float:
@@ -103,7 +113,7 @@ def residual(recording: Recording, predicted: PointSeries, noise: Noise, offsets
         parts.append(np.array([clock / offsets.clock]))
     if offsets.constant > 0:
         parts.append(constant / offsets.constant)
-    return Residual(difference, np.concatenate(parts), clock)
+    return Residual(difference, np.concatenate(parts), clock, constant)
 
 
 def rms_apart(pairs: Iterable[tuple[FloatArray, FloatArray]]) -> float:

@@ -197,10 +197,11 @@ def _take(
 
 
 def point_error(predicted: FloatArray | None, measured: FloatArray | None) -> FloatArray | None:
-    """Root mean square of each point over time and axes ``(P,)``; None if points do not correspond."""
+    """Root mean square of each point over what is seen of it ``(P,)``; None if points do not correspond."""
     if predicted is None or measured is None or predicted.shape != measured.shape:
         return None
-    square = ((predicted - measured) ** 2).mean(axis=2)
-    seen = np.isfinite(square)
-    mean = np.where(seen, square, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    return np.asarray(np.where(seen.any(axis=0), np.sqrt(mean), np.nan))
+    apart = predicted - measured
+    seen = np.isfinite(apart)
+    mean = np.where(seen, apart, 0.0) ** 2
+    count = seen.sum(axis=(0, 2))
+    return np.asarray(np.where(count > 0, np.sqrt(mean.sum(axis=(0, 2)) / np.maximum(count, 1)), np.nan))

@@ -10,6 +10,7 @@ from ...core.parameters import ParameterSpace
 from ...core.rollout import Trajectory
 from ...core.study import Task
 from ..residuals import Residual, residual
+from .comparing.held import as_recorded
 from .work import Work
 
 
@@ -59,11 +60,11 @@ class BeforeAfter:
             series = self._problem.recordings[name].series
             out[name] = {"time": (series.time, ["time"], "s")}
             for when, trajectory, r in zip(("before", "after"), take.trajectories, take.residuals, strict=True):
-                points = trajectory.series.points
+                shown = as_recorded(trajectory, r)
                 out[name] |= {
                     f"error_{when}": (r.by_time, ["time"], series.unit),
-                    f"predicted_{when}": (points, ["time", "predicted_point", "axis"], series.unit),
-                    f"vertices_{when}": (trajectory.vertices, ["time", "vertex", "axis"], "m"),
+                    f"predicted_{when}": (shown.series.points, ["time", "predicted_point", "axis"], series.unit),
+                    f"vertices_{when}": (shown.vertices, ["time", "vertex", "axis"], "m"),
                 }
         return out
 

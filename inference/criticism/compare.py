@@ -22,7 +22,7 @@ from ..sequential.result import load_fit
 from .comparing.adequacy import adequacy
 from .comparing.excess import excess, sentence
 from .comparing.groups import motion_of, partitions
-from .comparing.held import Held
+from .comparing.held import Held, as_recorded
 from .comparing.joining import rejoined
 from .comparing.result import Comparison, Row, pieces_sentence, sets_sentence
 from .comparing.sets import SetView, set_view
@@ -86,14 +86,20 @@ def _held(study: Study, name: str, outcomes: Sequence[Outcome], noise: Noise) ->
     offsets = offsets_of(study)
     if not isinstance(best, Trajectory):
         raise MuslinError(f"the best fit cannot be simulated on recording {name!r}: {best.reason}")
-    predicted = [o.series.points for o in draws if isinstance(o, Trajectory)]
+    time, off = recording.series.time, residual(recording, best.series, noise, offsets)
+    predicted = [
+        residual(recording, o.series, noise, offsets).recorded(time, o.series.points)
+        for o in draws
+        if isinstance(o, Trajectory)
+    ]
     nowhere = np.full(recording.series.points.shape, np.nan)
     return Held(
         recording,
         scenario,
         name in study.problem.fit_on,
         best,
-        residual(recording, best.series, noise, offsets),
+        as_recorded(best, off),
+        off,
         np.stack(predicted) if predicted else np.zeros((0, *best.series.points.shape)),
         study.problem.extractor.uses_markers,
         residual(recording, carried(recording, scenario), noise, offsets).difference,

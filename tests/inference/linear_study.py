@@ -9,7 +9,7 @@ from muslin.core.motion import Motion
 from muslin.core.rollout import Trajectory
 from muslin.core.scenario import Scenario
 from muslin.core.series import PointSeries
-from muslin.inference.criticism.comparing.held import Held
+from muslin.inference.criticism.comparing.held import Held, as_recorded
 from muslin.inference.noise import Noise
 from muslin.inference.residuals import Offsets, residual
 
@@ -57,9 +57,8 @@ def fitted(
     jacobian = np.stack([white(truth + e) - start for e in np.eye(PARAMETERS)], axis=1)
     unit = truth - np.linalg.lstsq(jacobian, start, rcond=None)[0]
     best = Trajectory(predicted(unit), base, np.zeros((FRAMES, 1, 7)))
-    held = Held(
-        recording, scenario(), True, best, residual(recording, best.series, noise, offsets), np.zeros((0, *base.shape))
-    )
+    off = residual(recording, best.series, noise, offsets)
+    held = Held(recording, scenario(), True, best, as_recorded(best, off), off, np.zeros((0, *base.shape)))
     return [held], jacobian, unit
 
 

@@ -8,6 +8,7 @@ import pytest
 from linear_study import SD, TIME, fitted, measured
 from next_world import cut_in_half, register, rope_study
 
+from muslin.core.rollout import Trajectory
 from muslin.core.series import PointSeries
 from muslin.inference.criticism.comparing.groups import partitions
 from muslin.inference.criticism.comparing.held import Held
@@ -32,12 +33,16 @@ def cut(take: Held, name: str, part: slice) -> Held:
     def of(series: PointSeries) -> PointSeries:
         return replace(series, time=series.time[part], points=series.points[part])
 
-    seen, best, off = take.recording, take.best, take.residual.difference[part]
+    def of_part(whole: Trajectory) -> Trajectory:
+        return replace(whole, series=of(whole.series), vertices=whole.vertices[part], poses=whole.poses[part])
+
+    seen, off = take.recording, take.residual.difference[part]
     return replace(
         take,
         recording=replace(seen, name=name, series=of(seen.series)),
         scenario=replace(take.scenario, times=take.scenario.times[part]),
-        best=replace(best, series=of(best.series), vertices=best.vertices[part], poses=best.poses[part]),
+        best=of_part(take.best),
+        shown=of_part(take.shown),
         residual=replace(take.residual, difference=off, white=off[np.isfinite(off)] / SD),
         draws=take.draws[:, part],
         baseline=take.baseline[part],
@@ -55,6 +60,7 @@ def test_pieces_put_together_are_what_was_cut() -> None:
         (joined.recording.series.points, take.recording.series.points),
         (joined.recording.series.time, take.recording.series.time),
         (joined.best.vertices, take.best.vertices),
+        (joined.shown.vertices, take.shown.vertices),
         (joined.draws, take.draws),
         (joined.baseline, take.baseline),
         (joined.unfitted, take.unfitted),

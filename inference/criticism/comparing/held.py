@@ -1,6 +1,6 @@
 """One recording held against the best prediction of it, and the numbers that are compared."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,16 @@ from ...residuals import Residual
 from .surface import surface_lattice
 
 
+def as_recorded(predicted: Trajectory, off: Residual) -> Trajectory:
+    """``predicted`` when and where the recording would show it, by the offsets that were taken out of ``off``.
+
+    The mesh stays where it is if the offset is one of pixels.
+    """
+    time, series = predicted.series.time, predicted.series
+    vertices = (off.recorded if series.unit == "m" else off.late)(time, predicted.vertices)
+    return replace(predicted, series=replace(series, points=off.recorded(time, series.points)), vertices=vertices)
+
+
 @dataclass(frozen=True, eq=False)
 class Held:
     """A recording of T frames with P measured points, and its best prediction of Q points.
@@ -23,8 +33,9 @@ class Held:
         recording, scenario: what was measured, and how.
         fitted: the parameters were fitted on it.
         best: the prediction.
+        shown: the same when and where the recording would show it; see :func:`as_recorded`.
         residual: measured minus predicted, offsets taken out.
-        draws: predictions of posterior draws ``(K, T, Q, A)`` [unit].
+        draws: predictions of posterior draws, when and where the recording would show them ``(K, T, Q, A)`` [unit].
         marked: the predicted points are the markers of the scenario, and were not found in pictures.
         baseline: measured minus the first measured shape, carried along by the gripper ``(T, P, A)`` [unit].
         unfitted: measured minus what the unfitted model predicts, in the same way; NaN if it cannot be simulated.
@@ -34,6 +45,7 @@ class Held:
     scenario: Scenario
     fitted: bool
     best: Trajectory
+    shown: Trajectory
     residual: Residual
     draws: FloatArray
     marked: bool = True
@@ -57,7 +69,7 @@ class Held:
     @cached_property
     def partner(self) -> IntArray:
         """The predicted point that each measured one is held against ``(T, P)``; 0 where none was seen."""
-        measured, model = self.recording.series.points, self.best.series.points
+        measured, model = self.recording.series.points, self.shown.series.points
         if self.paired:
             return np.tile(np.arange(measured.shape[1]), (len(measured), 1))
         out = np.zeros(measured.shape[:2], np.int64)
@@ -71,7 +83,7 @@ class Held:
         """The vertex that each predicted point lies on, or nearest to ``(T, Q)``: in the rest shape if it is a marker,
         else in every frame, as the camera sees it where points are pixels.
         """
-        model, body = self.best.series.points, self.scenario.body
+        model, body = self.shown.series.points, self.scenario.body
         if self.marked:
             near = cKDTree(body.vertices).query(self.scenario.markers @ body.vertices)[1]
             return np.tile(near, (len(model), 1))
@@ -80,10 +92,10 @@ class Held:
     @cached_property
     def shapes(self) -> FloatArray:
         """The predicted vertices ``(T, V, A)``, as the camera sees them where points are pixels."""
-        if self.best.series.unit == "m":
-            return self.best.vertices
+        if self.shown.series.unit == "m":
+            return self.shown.vertices
         assert self.scenario.camera is not None
-        return self.scenario.camera.project(self.best.vertices)[0]
+        return self.scenario.camera.project(self.shown.vertices)[0]
 
     @property
     def usual_vertex(self) -> IntArray:
@@ -102,7 +114,7 @@ class Held:
         With correspondence the predicted point. Without, of named markers the predicted ones that lie nearest as a
         whole, none taken twice; of points anywhere on the object the nearest place on its predicted surface.
         """
-        measured, model = self.recording.series.points, self.best.series.points
+        measured, model = self.recording.series.points, self.shown.series.points
         if self.paired:
             return model
         out = np.full(measured.shape, np.nan)
@@ -133,7 +145,7 @@ class Held:
         if self.paired:
             return noise
         out = np.zeros_like(noise)
-        model, origin = self.best.series.points, self.origin
+        model, origin = self.shown.series.points, self.origin
         for t, seen in enumerate(self.recording.series.valid):
             if seen.any():
                 made = origin[t, seen] + noise[:, t, seen]

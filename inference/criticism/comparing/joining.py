@@ -33,6 +33,7 @@ def rejoined(takes: Sequence[Held], cut_from: Mapping[str, str]) -> list[Held]:
                 recording=replace(first.recording, name=name, series=_series([h.recording.series for h in pieces])),
                 scenario=scenarios[name],
                 best=_trajectory([h.best for h in pieces]),
+                shown=_trajectory([h.shown for h in pieces]),
                 residual=replace(
                     first.residual,
                     difference=np.concatenate([h.residual.difference for h in pieces]),

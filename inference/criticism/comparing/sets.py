@@ -67,14 +67,13 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
     object: here noise moves each point a little, so replicates are the prediction with that noise
     (Gretton et al., A kernel two-sample test, JMLR 13, 2012, for the statistic and the witness).
     """
-    shift = held.recording.series.points - held.residual.difference - _matched(held)  # offsets, and clock
-    measured = held.recording.series.points - np.nan_to_num(shift)
+    measured = held.recording.series.points.copy()
     unmeasured = ~np.isfinite(measured).any(axis=(0, 1))  # a coordinate that nobody measured agrees with any
     measured[..., unmeasured] = _matched(held)[..., unmeasured]
     columns = _spread(measured.shape[1], _MOST_POINTS)
     measured, origin = measured[:, columns], held.origin[:, columns]
     seen = np.asarray(np.isfinite(measured).all(axis=2))
-    model = held.best.series.points[:, _spread(held.best.series.points.shape[1], _MOST_POINTS)]
+    model = held.shown.series.points[:, _spread(held.shown.series.points.shape[1], _MOST_POINTS)]
     if held.paired:  # of points that correspond, those not seen say nothing about the others
         model = np.where(seen[..., None], model, np.nan)
     bandwidth = _median_distance(measured)
@@ -112,7 +111,7 @@ def set_view(held: Held, noise: Noise, rng: np.random.Generator) -> SetView:
 
 
 def _matched(held: Held) -> FloatArray:
-    return np.take_along_axis(held.best.series.points, held.partner[..., None], axis=1)
+    return np.take_along_axis(held.shown.series.points, held.partner[..., None], axis=1)
 
 
 class _Embedding:

@@ -85,7 +85,7 @@ def _select(which: IntArray, size: int) -> sparse.csr_array:
 
 def _smooth(held: Held, frames: int, points: int) -> sparse.csr_array:
     """Means over ``frames`` frames and ``points`` points of one recording; 0 for all of them. Rows of norm one."""
-    times, count, axes = len(held.partner), held.best.series.points.shape[1], held.seen.shape[2]
+    times, count, axes = len(held.partner), held.shown.series.points.shape[1], held.seen.shape[2]
     if frames == 0:
         in_time = sparse.csr_array(np.ones((1, times)))
     else:

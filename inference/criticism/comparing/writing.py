@@ -16,7 +16,7 @@ from .sets import SetView
 def write_take(group: zarr.Group, held: Held, sets: SetView, motion: IntArray) -> None:
     """One recording: what was measured, what is predicted, how far both are apart, and pictures' numbers."""
     unit = held.recording.series.unit
-    scatter = np.std(held.draws, axis=0) if len(held.draws) > 1 else np.zeros_like(held.best.series.points)
+    scatter = np.std(held.draws, axis=0) if len(held.draws) > 1 else np.zeros_like(held.shown.series.points)
     arrays: list[tuple[str, Any, list[str], str]] = [
         ("time", held.recording.series.time, ["time"], "s"),
         ("error", held.residual.by_time, ["time"], unit),
@@ -24,8 +24,8 @@ def write_take(group: zarr.Group, held: Held, sets: SetView, motion: IntArray) -
         ("point_error", held.residual.by_point, ["point"], unit),
         ("difference", held.residual.difference, ["time", "point", "axis"], unit),
         ("measured", held.recording.series.points, ["time", "point", "axis"], unit),
-        ("predicted", held.best.series.points, ["time", "predicted_point", "axis"], unit),
-        ("vertices", held.best.vertices, ["time", "vertex", "axis"], "m"),
+        ("predicted", held.shown.series.points, ["time", "predicted_point", "axis"], unit),
+        ("vertices", held.shown.vertices, ["time", "vertex", "axis"], "m"),
         ("triangles", held.scenario.body.triangles, ["triangle", "corner"], "1"),
         ("motion_phase", motion, ["time"], "1"),
         ("mmd", sets.mmd, ["time"], "1"),
