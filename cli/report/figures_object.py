@@ -18,6 +18,8 @@ _ELEVATIONS = (8.0, 16.0, 26.0, 36.0)
 #: The colour scale reaches at least so many standard deviations of the noise.
 _PALE = 8.0
 _EDGE = (0.12, 0.15, 0.18, 0.28)
+#: Of the picture's height: so wide it is at least, that titles fit; an object smaller than this is drawn as points.
+_NARROWEST, _SPECK = 0.6, 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +61,25 @@ class Snapshot:
             seen = np.isfinite(apart)
             along = np.sqrt(np.sum(np.where(seen, apart, 0.0) ** 2, axis=1))
             return np.asarray(np.where(seen.any(axis=1), along, np.nan))
+        gaps = self._gaps()
+        return np.asarray(gaps.min(axis=1) if gaps.size else np.full(len(self.predicted), np.nan))
+
+    def distances(self) -> FloatArray:
+        """Distance of each point that was measured ``(N,)`` to its predicted one, or to the nearest."""
+        errors = self.errors() if self.paired else self._gaps().min(axis=0)
+        return np.asarray(errors[np.isfinite(errors)])
+
+    def places(self) -> FloatArray:
+        """Where the measured points are drawn ``(P, 3)``: along axes that were not seen, where they are predicted."""
+        if not self.paired:
+            return self.measured
+        seen = np.isfinite(self.measured)
+        return np.where(seen.any(axis=1, keepdims=True) & ~seen, self.predicted, self.measured)
+
+    def _gaps(self) -> FloatArray:
+        """From each predicted point to each that was measured ``(Q, N)``."""
         seen = self.measured[np.isfinite(self.measured).all(axis=1)]
-        gaps = np.linalg.norm(self.predicted[:, None] - seen[None], axis=2)
-        return np.asarray(gaps.min(axis=1) if len(seen) else np.full(len(self.predicted), np.nan))
+        return np.asarray(np.linalg.norm(self.predicted[:, None] - seen[None], axis=2))
 
     def vertex_errors(self) -> FloatArray:
         """Error ``(V,)`` spread from the points over the mesh by inverse distance."""
@@ -126,7 +144,7 @@ def best_view(shots: list[Snapshot]) -> FloatArray:
     first = shots[0]
     if first.in_picture:  # from where it was taken
         return camera(-0.5 * np.pi, 0.0)
-    gaps = first.measured - first.predicted if first.paired else np.zeros((1, 3))
+    gaps = first.places() - first.predicted if first.paired else np.zeros((1, 3))
     gaps = gaps[np.isfinite(gaps).all(axis=1)]
     clouds = [s.predicted if s.vertices is None else s.vertices for s in shots]
     best, view = -np.inf, camera(-1.0, 0.3)
@@ -142,8 +160,8 @@ def best_view(shots: list[Snapshot]) -> FloatArray:
     return view
 
 
-def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray) -> None:
-    """One snapshot in parallel projection, far triangles first."""
+def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray, speck: bool = False) -> None:
+    """One snapshot in parallel projection, far triangles first; the points, too, of a ``speck``, too small to see."""
     flat = shot.predicted @ view.T
     around = [(line @ view.T)[:, :2] for line in shot.outlines]
     axes.add_collection(LineCollection(around, colors=SOFT, linewidths=0.7, alpha=0.6, zorder=0))
@@ -161,10 +179,10 @@ def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray)
         axes.add_collection(
             PolyCollection(list(seen[faces][..., :2]), facecolors=colours, edgecolors=_EDGE, linewidths=0.35, zorder=1)
         )
-    else:
+    if shot.vertices is None or shot.triangles is None or speck:
         colours = ERROR_MAP(norm(np.nan_to_num(shot.errors())))
         axes.scatter(flat[:, 0], flat[:, 1], c=colours, s=26, edgecolors=SOFT, linewidths=0.3, zorder=1)
-    there = shot.measured @ view.T
+    there = shot.places() @ view.T
     if shot.paired:
         pairs = np.stack([flat[:, :2], there[:, :2]], axis=1)
         pairs = pairs[np.isfinite(pairs).all(axis=(1, 2))]
@@ -173,12 +191,13 @@ def draw_snapshot(axes: Axes, shot: Snapshot, norm: Normalize, view: FloatArray)
 
 
 def window(shots: list[Snapshot], view: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Low and high corner ``(2,)`` of everything drawn, with a margin."""
-    parts = [p for s in shots for p in (s.predicted, s.measured, s.vertices) if p is not None]
+    """Low and high corner ``(2,)`` of everything drawn, with a margin, and not too narrow."""
+    parts = [p for s in shots for p in (s.predicted, s.places(), s.vertices) if p is not None]
     flat = np.concatenate(parts) @ view[:2].T
     low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
     margin = 0.04 * float((high - low).max()) + 1e-9
-    return low - margin, high + margin
+    margins = np.array([max(margin, 0.5 * (_NARROWEST * float(high[1] - low[1]) - float(high[0] - low[0]))), margin])
+    return low - margins, high + margins
 
 
 def add_snapshots(figure: FigureBase, spots: list[Axes], shots: list[Snapshot], take: Take) -> None:
@@ -188,13 +207,14 @@ def add_snapshots(figure: FigureBase, spots: list[Axes], shots: list[Snapshot], 
     norm, view = Normalize(0.0, top), best_view(shots)
     low, high = window(shots, view)
     for axes, shot in zip(spots, shots, strict=True):
-        draw_snapshot(axes, shot, norm, view)
+        size = 0.0 if shot.vertices is None else float(np.ptp(shot.vertices, axis=0).max())
+        draw_snapshot(axes, shot, norm, view, size < _SPECK * float(high[1] - low[1]))
         axes.set_xlim(float(low[0]), float(high[0]))
         axes.set_ylim(float(low[1]), float(high[1]))
         axes.set_aspect("equal")
         bare(axes)
-        errors = shot.errors()[np.isfinite(shot.errors())]
-        away = f": points {plain(float(np.sqrt(np.mean(errors**2))) * factor)} {label} away" if len(errors) else ""
+        far = shot.distances()
+        away = f": points {plain(float(np.sqrt(np.mean(far**2))) * factor)} {label} away" if len(far) else ""
         axes.set_title(f"{shot.title}{away}", fontsize=9.5, color=INK)
     _scale_bar(spots[0], low, high, factor, label)
     drawn = figure.colorbar(

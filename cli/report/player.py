@@ -38,7 +38,7 @@ def _frames(take: Take) -> list[int]:
 def _pack(take: Take, name: str, frames: list[int]) -> str:
     film = [snapshots(take, name, k) for k in frames]
     film = [f for f in film if f and f[0].vertices is not None]
-    measured = np.stack([f[0].measured for f in film])
+    measured = np.stack([f[0].places() for f in film])
     shown = np.concatenate([measured, np.stack([f[0].predicted for f in film])], axis=1)
     low, high = np.nanmin(shown, axis=(0, 1)), np.nanmax(shown, axis=(0, 1))
     centre, reach = 0.5 * (low + high), 2.0 * float((high - low).max()) + 1e-9

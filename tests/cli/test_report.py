@@ -220,6 +220,9 @@ def test_points_that_are_seen_along_some_axes_only_are_drawn_and_told(tmp_path: 
                 compared[f"{name}/{array}"][...] = values
     shown = snapshots(gather(study).takes[0], "")[0]
     assert np.isfinite(shown.errors()).any() == (axes.stop < 3)
+    drawn = np.isfinite(shown.places())
+    np.testing.assert_array_equal(drawn, np.isfinite(shown.measured).any(axis=1, keepdims=True) & np.ones(3, bool))
+    np.testing.assert_array_equal(shown.places()[drawn[:, 0], axes], shown.predicted[drawn[:, 0], axes])
     assert overview_figure(study).startswith(b"\x89PNG")
     assert "error" in page_of(study).text
 

@@ -1,0 +1,42 @@
+"""The object at its worst moment: what is drawn of it, and how far away its points are said to be."""
+
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from muslin.cli.report.figures_object import Snapshot, camera, draw_snapshot, window
+
+SQUARE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
+SHOT = Snapshot("a", SQUARE, SQUARE + np.array([0.0, 0.3, 0.4]), SQUARE, TRIANGLES)
+
+
+def test_points_that_correspond_are_as_far_away_as_their_own() -> None:
+    np.testing.assert_allclose(SHOT.distances(), 0.5)
+
+
+def test_a_cloud_is_as_far_away_as_what_was_seen_of_it() -> None:
+    """A camera that sees a corner says nothing about the rest, which a model that is right has, too."""
+    seen = replace(SHOT, measured=np.array([[0.0, 0.01, 0.0], [np.nan] * 3]), correspondence=False)
+    np.testing.assert_allclose(seen.distances(), 0.01)
+    assert seen.errors().max() > 0.1
+    unseen = replace(seen, measured=np.full((2, 3), np.nan))
+    assert not len(unseen.distances()) and np.isnan(unseen.errors()).all()
+
+
+def test_what_is_far_higher_than_wide_gets_a_window_that_its_title_fits() -> None:
+    view = camera(-0.5 * np.pi, 0.0)
+    low, high = window([replace(SHOT, measured=SQUARE + np.array([0.0, 0.0, 10.0]))], view)
+    assert high[0] - low[0] >= 0.5 * (high[1] - low[1])
+    middle = 0.5 * (low + high)
+    np.testing.assert_allclose(middle, [0.05, 5.05], atol=1e-9)
+
+
+def test_what_is_too_small_to_see_is_drawn_as_points_too() -> None:
+    axes = Figure().add_subplot()
+    for speck, more in ((False, 0), (True, 1)):
+        before = len(axes.collections)
+        draw_snapshot(axes, SHOT, Normalize(0, 1), camera(-0.5 * np.pi, 0.0), speck)
+        assert len(axes.collections) - before == 4 + more  # outlines, mesh, pairs, measured
