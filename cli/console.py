@@ -13,8 +13,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-#: Time between two lines of progress where there is no terminal [s].
-QUIET = 5.0
+#: Time between two lines of progress where there is no terminal, that say the same but for the count, or not [s].
+QUIET, BRIEF = 5.0, 1.0
 
 
 def say(text: str) -> None:
@@ -86,7 +86,8 @@ class ProgressView:
 
     def _line(self, text: str, done: int, total: int) -> None:
         now = time.monotonic()
-        if now - self._shown < QUIET:
+        if now - self._shown < (QUIET if text == self._text else BRIEF):
             return
-        self._shown = now
-        print(f"{text}: {done} of {total}" if total else text, file=self._stream, flush=True)
+        self._shown, self._text = now, text
+        far = f": {done} of {total}" if total else f": {done} rollouts" if done else ""
+        print(f"{text}{far}", file=self._stream, flush=True)

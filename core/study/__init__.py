@@ -3,7 +3,8 @@
 from .config import StudyConfig, parse_config, read_config, write_config
 from .pool import Failure, Outcome, SimulationPool, Task
 from .problem import Problem, build_problem
-from .study import Progress, Study, silent
+from .progress import Progress, silent
+from .study import Study
 
 __all__ = [
     "Failure",

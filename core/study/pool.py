@@ -5,7 +5,7 @@ import pickle
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from queue import SimpleQueue
@@ -45,12 +45,14 @@ class SimulationPool:
             made in a notebook, a script without a main guard) is simulated in this one instead, with a warning.
             0 always does that: no process to wait for, but an engine that hangs or crashes cannot be ended;
             the time limit holds between steps alone.
+        watch: called after every rollout.
     """
 
-    def __init__(self, problem: Problem, workers: int | None = None) -> None:
+    def __init__(self, problem: Problem, workers: int | None = None, watch: Callable[[], None] = lambda: None) -> None:
         self.problem = problem
         self.workers = workers if workers is not None else (os.cpu_count() or 1)
         self.count = 0  # rollouts run
+        self._watch = watch
         self._played_as = problem.played_as()
         self._threads: ThreadPoolExecutor | None = None
         self._idle: SimpleQueue[Worker | None] = SimpleQueue()  # None: a process yet to be started
@@ -91,7 +93,8 @@ class SimulationPool:
         asked = [(self._played_as[t.recording], tuple(sorted(t.values.items()))) for t in tasks]
         once = list(dict.fromkeys(asked))
         self.count += len(once)
-        outcomes = _repeated(asked, self._outcomes([Task(dict(values), name) for name, values in once]))
+        run = self._watched(self._outcomes([Task(dict(values), name) for name, values in once]))
+        outcomes = _repeated(asked, run)
         refused: list[Failure] = []
         for outcome in outcomes:
             if not self._accepted and isinstance(outcome, Failure) and outcome.refused:
@@ -103,6 +106,11 @@ class SimulationPool:
             yield outcome
         if refused:
             raise InputError(refused[0].reason)
+
+    def _watched(self, outcomes: Iterator[Outcome]) -> Iterator[Outcome]:
+        for outcome in outcomes:
+            self._watch()
+            yield outcome
 
     def _outcomes(self, tasks: list[Task]) -> Iterator[Outcome]:
         if self.workers > 0 and tasks:

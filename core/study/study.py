@@ -2,8 +2,8 @@
 
 import hashlib
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,7 @@ from ..store import damage_errors, new_store, open_store, storage_errors
 from .config import ParameterTable, StudyConfig, read_config, write_config
 from .pool import SimulationPool
 from .problem import Problem, build_problem
-
-#: ``(text, done, total)``: a line of progress; total 0 when it is not known.
-Progress = Callable[[str, int, int], None]
-
-
-def silent(text: str, done: int, total: int) -> None:
-    """The progress of a study that nobody watches."""
+from .progress import Counted, Progress, silent
 
 
 class Study:
@@ -60,6 +54,15 @@ class Study:
         """Read a study file."""
         return cls(read_config(Path(path)), Path(path), workers=workers, progress=progress)
 
+    @property
+    def progress(self) -> Counted:
+        """What is called as work goes on; any :data:`Progress` may be put there."""
+        return self._progress
+
+    @progress.setter
+    def progress(self, show: Progress) -> None:
+        self._progress = Counted(show)
+
     def save(self) -> None:
         write_config(self.config, self.path)
 
@@ -86,7 +89,8 @@ class Study:
         return build_problem(self.config, self.measurement, self.path.parent)
 
     def pool(self, problem: Problem | None = None) -> SimulationPool:
-        return SimulationPool(problem or self.problem, self.workers)
+        problem = problem or self.problem
+        return SimulationPool(problem, self.workers, partial(self.progress.rollout, problem.told_as))
 
     def fingerprint(self, step: str = "fit") -> dict[str, Any]:
         """What the result of a step depends on: the study file, the files that it names, and what was measured.

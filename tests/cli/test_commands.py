@@ -1,6 +1,5 @@
 """Commands in this process, with steps that stand in for the real ones."""
 
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from running import Muslin, cloth_measurement
 
-from muslin.cli.console import ProgressView
 from muslin.cli.failure import BAD_INPUT, INTERNAL, describe
 from muslin.cli.main import run
 from muslin.core.errors import InputError
@@ -265,28 +263,6 @@ def test_check_passes_and_fails(capsys: pytest.CaptureFixture[str], monkeypatch:
     assert "FAIL" in capsys.readouterr().out
     assert status("check", "fit") == 2
     assert "no conformance kit" in capsys.readouterr().err
-
-
-def test_progress_without_a_terminal_is_a_line_every_few_seconds() -> None:
-    stream = io.StringIO()
-    with ProgressView(stream) as progress:
-        for k in range(1000):
-            progress("simulating [1]", k + 1, 1000)
-    assert stream.getvalue() == "simulating [1]: 1 of 1000\n"
-
-
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_progress_on_a_terminal_is_a_bar(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("TERM", "xterm")
-    stream = Terminal()
-    with ProgressView(stream) as progress:
-        progress("simulating [1]", 3, 10)
-        progress("training", 0, 0)
-    assert "simulating [1]" in stream.getvalue() and "training" in stream.getvalue()
 
 
 def test_help_and_version(muslin: Muslin) -> None:

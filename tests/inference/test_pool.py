@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from next_world import STIFFNESS, register, rope_study
 
 from muslin.backends.mujoco.simulator import MujocoSimulator
 from muslin.core.arrays import FloatArray
@@ -219,3 +220,16 @@ def test_a_script_without_a_main_guard_ends_with_an_error(small_study: Study) ->
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=120, cwd=Path.home())
     assert done.returncode != 0
     assert "if __name__ == '__main__'" in done.stderr
+
+
+def test_a_search_of_unknown_length_counts_its_rollouts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    register(monkeypatch)
+    study, heard = rope_study(tmp_path), list[tuple[str, int, int]]()
+    study.progress = lambda *told: heard.append(told)
+    tasks = [Task({"stretch_stiffness": STIFFNESS + k}, "slow") for k in range(2)]
+    with study.pool() as pool:
+        study.progress("polishing", 0, 0)
+        list(pool.map(tasks))
+        study.progress("simulating", 1, 2)  # counts for itself
+        list(pool.map(tasks))
+    assert heard == [("polishing", 0, 0), ("polishing", 1, 0), ("polishing", 2, 0), ("simulating", 1, 2)]
