@@ -83,7 +83,7 @@ def ball(name: str) -> Case:
         save_measurement(Measurement(tuple(drops)), folder / "balls.zarr")
         return Study.load(folder / f"{name}.toml", workers=workers)
 
-    return Case(f"ball: {name}", EXAMPLES / "balls/drops.csv", make)
+    return Case(f"ball: {name}", EXAMPLES / "balls/drops.csv", make, picture=name == "tennis")
 
 
 def beam(take: str, told: str = "", offset: float = 0.0) -> Case:
