@@ -47,7 +47,7 @@ def new(
     simulator: Annotated[str, typer.Option(metavar="NAME", help="The engine; muslin plugins lists them.")] = "mujoco",
     estimator: Annotated[
         str, typer.Option(metavar="NAME", help="The posterior estimator; muslin plugins lists them.")
-    ] = "bayessim-rkhs",
+    ] = "npe-rkhs",
     fit_on: Annotated[
         str,
         typer.Option(

@@ -112,7 +112,7 @@ class StudyConfig(StrictTable):
     scenario: ScenarioTable
     simulator: _OpenTable
     extractor: _OpenTable = Field(default_factory=lambda: _OpenTable(name="markers"))
-    estimator: EstimatorTable = Field(default_factory=lambda: EstimatorTable(name="bayessim-rkhs"))
+    estimator: EstimatorTable = Field(default_factory=lambda: EstimatorTable(name="npe-rkhs"))
     material: dict[str, float] = Field(default_factory=dict)
     parameters: dict[str, ParameterTable] = Field(default_factory=dict)
     effects: dict[str, dict[str, float | ParameterTable]] = Field(default_factory=dict)
