@@ -78,6 +78,13 @@ def read_compared(group: zarr.Group) -> Compared | None:
     )
 
 
+def distance(apart: FloatArray) -> FloatArray:
+    """Lengths ``(...)`` of differences ``(..., A)``, along the axes that were seen; NaN where none was."""
+    seen = np.isfinite(apart)
+    length = np.sqrt(np.sum(np.where(seen, apart, 0.0) ** 2, axis=-1))
+    return np.asarray(np.where(seen.any(axis=-1), length, np.nan))
+
+
 def view_name(view: FloatArray) -> str:
     """What is to the right and what is up in a view ``(2, A)``."""
     names = []

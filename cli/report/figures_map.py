@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 
-from .compared import Compared
+from .compared import Compared, distance
 from .figures_object import heat_top
 from .findings import Take
 from .style import ERROR_MAP, INK, SOFT, data_uri, look, new_figure, png
@@ -20,7 +20,7 @@ def map_figure(take: Take) -> str | None:
     if c is None or not take.correspondence or c.difference.shape[:2] != c.predicted.shape[:2]:
         return None
     factor, unit = shown_unit(take.unit)
-    error = np.linalg.norm(c.difference, axis=2) * factor
+    error = distance(c.difference) * factor
     known = c.distance is not None and np.isfinite(c.distance).all()
     order = np.argsort(c.distance, kind="stable") if known and c.distance is not None else np.arange(error.shape[1])
     norm = Normalize(0.0, heat_top(error / factor, take.noise) * factor)

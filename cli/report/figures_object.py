@@ -10,6 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import FigureBase
 
 from ...core.arrays import FloatArray, IntArray
+from .compared import distance
 from .findings import Take
 from .style import ERROR_MAP, INK, SOFT, bare, data_uri, look, new_figure, png
 from .words import plain, shown_unit
@@ -57,10 +58,7 @@ class Snapshot:
         Of a point that was measured along some axes only, the distance along these; NaN of one that was not seen.
         """
         if self.paired:
-            apart = self.predicted - self.measured
-            seen = np.isfinite(apart)
-            along = np.sqrt(np.sum(np.where(seen, apart, 0.0) ** 2, axis=1))
-            return np.asarray(np.where(seen.any(axis=1), along, np.nan))
+            return distance(self.predicted - self.measured)
         gaps = self._gaps()
         return np.asarray(gaps.min(axis=1) if gaps.size else np.full(len(self.predicted), np.nan))
 

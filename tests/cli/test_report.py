@@ -13,6 +13,7 @@ from report_page import Page, page_of
 
 from muslin.cli import steps
 from muslin.cli.report import overview_figure, write_report
+from muslin.cli.report.compared import distance
 from muslin.cli.report.figures_object import snapshots
 from muslin.cli.report.gather import gather
 from muslin.cli.report.predictive import predictive_data
@@ -224,6 +225,9 @@ def test_points_that_are_seen_along_some_axes_only_are_drawn_and_told(tmp_path: 
     np.testing.assert_array_equal(drawn, np.isfinite(shown.measured).any(axis=1, keepdims=True) & np.ones(3, bool))
     np.testing.assert_array_equal(shown.places()[drawn[:, 0], axes], shown.predicted[drawn[:, 0], axes])
     assert overview_figure(study).startswith(b"\x89PNG")
+    compared = gather(study).takes[0].compared
+    assert compared is not None
+    assert np.isfinite(distance(compared.difference)).any() == (axes.stop < 3)
     assert "error" in page_of(study).text
 
 
