@@ -38,11 +38,16 @@ class Polished(Found):
         covariance: of ``unit``, from the curvature at the best fit (Laplace), ``(D, D)``.
         count: independent numbers that the residuals are worth: what :attr:`rss` is when only noise is left.
         rested: the search ended by itself, so that more evaluations from here gain next to nothing.
+        grown: the covariance is this many times what the curvature makes it, for the luck that a search finds.
+        together: what is left counts as this many times the squares that noise leaves, as it goes together in time; 0
+            where nobody asked.
     """
 
     covariance: FloatArray
     count: float
     rested: bool = False
+    grown: float = 1.0
+    together: float = 0.0
 
     @property
     def left(self) -> float:
@@ -52,13 +57,17 @@ class Polished(Found):
     @property
     def excess(self) -> float:
         """By how much less the data tell than noise alone would let them: what is left beyond noise counts as noise."""
-        return max(1.0, self.left)
+        return max(1.0, self.left, self.together)
 
     @property
     def widened(self) -> FloatArray:
-        """The covariance ``(D, D)`` to be told, with the excess counted as noise."""
-        information = np.linalg.inv(self.covariance) + (self.excess - 1.0) * PRIOR * np.eye(len(self.unit))
-        return np.asarray(self.excess * np.linalg.inv(information), float)
+        """The covariance ``(D, D)`` to be told, with the excess counted as noise.
+
+        Luck and what goes together are two reasons why the best fit may be elsewhere: the greater counts.
+        """
+        excess = max(1.0, self.left, self.together / self.grown)
+        information = np.linalg.inv(self.covariance) + (excess - 1.0) * PRIOR * np.eye(len(self.unit))
+        return np.asarray(excess * np.linalg.inv(information), float)
 
 
 class Objective:

@@ -66,9 +66,10 @@ def seen_past_chance(objective: Objective, best: Polished) -> Polished:
     # the uniform prior of a unit interval has variance 1/12
     covariance = (vectors / (np.maximum(values, 0.0) + PRIOR)) @ vectors.T
     luck = float(np.sqrt(np.mean([differences[0].luck ** 2 for differences in found])))
-    grown = (1.0 + luck / len(best.unit)) * covariance
-    scale = np.sqrt(np.minimum(1.0, 1.0 / PRIOR / np.diag(grown)))  # no less is known than the prior says
-    return replace(best, covariance=np.asarray(grown * np.outer(scale, scale), float))
+    grown = 1.0 + luck / len(best.unit)
+    told = grown * covariance
+    scale = np.sqrt(np.minimum(1.0, 1.0 / PRIOR / np.diag(told)))  # no less is known than the prior says
+    return replace(best, covariance=np.asarray(told * np.outer(scale, scale), float), grown=grown)
 
 
 def _wider_and_wider(objective: Objective, best: Polished, k: int) -> Iterator[_Difference]:

@@ -101,6 +101,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
         "warnings": warnings,
         "derivative_step": polishing.objective.discrepancy.step,
         "left": best.left,
+        "counted": best.excess,
         "at_bound": [n for i, n in enumerate(space.names) if any(a.index == i for a in held)],
     }
     sd = physical_sd(space, best.unit, best.widened)

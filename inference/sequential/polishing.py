@@ -22,6 +22,7 @@ from .draws import DrawStore
 from .ellipsoid import Ellipsoid
 from .narrowing import narrowed
 from .takes import Takes
+from .together import told_together
 
 #: A search that has not come to rest goes on so often at most, or many parameters are still far from where they fit.
 GOES_ON = 3
@@ -95,7 +96,7 @@ class Polishing:
             self._polish(upto, self._in_order(upto, NONE)[0][0])
         else:
             draws, least = self._in_order(upto, self.objective.discrepancy)
-            if self.best.rss - least > CHANCE * TOLD_APART * self.best.left:
+            if self.best.rss - least > CHANCE * TOLD_APART * self.best.excess:
                 self._polish(upto, draws[0])
         truer = self._truer()
         if truer is not self.noise:
@@ -142,7 +143,7 @@ class Polishing:
             if best.rested:
                 break
             best = polish(objective, best.unit, known=best.jacobian)
-        self._found = objective, seen_past_chance(objective, best)
+        self._found = objective, told_together(objective, seen_past_chance(objective, best))
         values = space.as_dict(space.from_unit(best.unit))
         self._outcomes = dict(zip(names, self._pool.map([Task(values, name) for name in names]), strict=True))
 

@@ -42,8 +42,9 @@ class FitResult:
         failed: draws that could not be simulated.
         seconds: of the run that finished the fit.
         derivative_step: of one-sided differences in the unit cube that suits this model; see :mod:`..roughness`.
-        left: squares that the best fit leaves, in parts of what noise leaves. What is above one counts as noise in
-            ``sd`` and in the posterior.
+        left: squares that the best fit leaves, in parts of what noise leaves.
+        counted: the same, as often as they count, as what is left goes together in time; see :mod:`.together`. What is
+            above one counts as noise in ``sd`` and in the posterior.
     """
 
     names: tuple[str, ...]
@@ -61,6 +62,7 @@ class FitResult:
     seconds: float
     derivative_step: float
     left: float = 1.0
+    counted: float = 1.0
 
     def values(self) -> dict[str, float]:
         """The best fit by name."""
@@ -87,10 +89,11 @@ class FitResult:
                 f"posterior {mean[k]:.4g} ± {spread[k]:.2g}{unit}"
             )
         if self.left > _MUCH:
-            times = f"{self.left:.0f}" if self.left >= 10.0 else f"{self.left:.2g}"
+            more = self.counted / self.left
+            lasting = f", {_times(more)} times over, as it lasts" if more > _MUCH else ""
             lines.append(
-                f"  the best fit leaves {times} times the squares that noise leaves: ± and the posterior take what is "
-                "more for noise; muslin compare says where it is"
+                f"  the best fit leaves {_times(self.left)} times the squares that noise leaves: ± and the posterior "
+                f"take what is more for noise{lasting}; muslin compare says where it is"
             )
         lines += self._explained(mean, spread)
         size, unit = (self.noise.sd * 1e3, "mm") if self.noise.unit == "m" else (self.noise.sd, self.noise.unit)
@@ -189,7 +192,12 @@ def load_fit(study: Study) -> FitResult:
             seconds=float(a["seconds"]),
             derivative_step=float(a["derivative_step"]),
             left=float(a.get("left", 1.0)),
+            counted=float(a.get("counted", a.get("left", 1.0))),
         )
+
+
+def _times(number: float) -> str:
+    return f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
 
 
 def _file_bytes(posterior: Posterior) -> FloatArray:

@@ -7,6 +7,7 @@ import pytest
 from small import TRUTH, small_measurement, write_study
 
 from muslin.core.registry import REGISTRY
+from muslin.core.store import read
 from muslin.core.study import Study, read_config, write_config
 from muslin.core.study.config import ParameterTable
 from muslin.inference.sequential import proposals
@@ -26,9 +27,12 @@ def test_the_posterior_is_as_wide_as_the_data_make_it(tmp_path: Path, seed: int)
 
 def test_what_a_model_misses_makes_its_posterior_as_much_wider(tmp_path: Path) -> None:
     drag = REGISTRY.get("effect", "viscous-damping")(rate=3.0)
-    result = Study.load(write_study(tmp_path, small_measurement(drag)), workers=0).fit()
-    assert result.left > 4.0 and "times the squares that noise leaves" in result.text()
-    width = result.samples.std(axis=0) / result.sd
+    study = Study.load(write_study(tmp_path, small_measurement(drag)), workers=0)
+    result = study.fit()
+    assert result.counted > 4.0 * result.left > 16.0
+    assert "times the squares that noise leaves" in result.text() and "times over, as it lasts" in result.text()
+    told = np.sqrt(np.diag(read(study.results()["fit"], "estimate_covariance")))
+    width = study.problem.space.to_unit(result.samples).std(axis=0) / told
     assert np.all((width > 0.5) & (width < 2.0)), width
 
 
