@@ -25,9 +25,9 @@ def told_together(objective: Objective, best: Polished) -> Polished:
 
     Args:
         objective: that was made least.
-        best: where, with its derivatives; where it leaves no misfit it is returned as it is.
+        best: where, with its derivatives; where it leaves no misfit, or parameters do nothing, it is as it was.
     """
-    if best.left < MISFIT:
+    if best.left < MISFIT or not best.jacobian.any():  # of parameters that do nothing there are no scores
         return best
     scores = [_by_frame(objective, best, k) for k in range(len(objective.recordings))]
     known = best.covariance / best.grown

@@ -70,6 +70,12 @@ def test_where_only_noise_is_left_nothing_changes() -> None:
     assert told_together(objective(), best) is best
 
 
+def test_what_does_nothing_is_as_unknown_as_before() -> None:
+    best = left_by(lasting(np.random.default_rng(0), 0.9, 3.0))
+    idle = Polished(best.unit, best.white, 0.0 * best.jacobian, np.eye(PARAMETERS) / PRIOR, best.count)
+    assert told_together(objective(), idle) is idle
+
+
 def test_luck_and_what_goes_together_are_not_counted_twice() -> None:
     best = told_together(objective(), left_by(lasting(np.random.default_rng(0), 0.95, 3.0)))
     lucky = Polished(best.unit, best.white, best.jacobian, 4.0 * best.covariance, best.count, grown=4.0)
