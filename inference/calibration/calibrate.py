@@ -63,7 +63,7 @@ def calibrate(study: Study, simulations: int = 0, predictive: int = PREDICTIVE) 
             f"{study.path} was fitted with {group.attrs.get('engine')}, but now there is "
             f"{problem.simulator.engine_version()}; run: muslin fit {study.path}"
         )
-    takes = takes_of(study, fit.noise, max(1.0, fit.left))
+    takes = takes_of(study, fit.noise, max(1.0, fit.counted))
     store = DrawStore(study, problem, takes.simulated, table.rounds * table.draws)
     theta, points, numbers = store.read(fit.rounds * table.draws)
     weights = read(group, "log_weights") if "log_weights" in group else None
