@@ -89,5 +89,5 @@ class ProgressView:
         if now - self._shown < (QUIET if text == self._text else BRIEF):
             return
         self._shown, self._text = now, text
-        far = f": {done} of {total}" if total else f": {done} rollouts" if done else ""
+        far = f": {done} of {total}" if total else f": {done} rollout{'s' * (done > 1)}" if done else ""
         print(f"{text}{far}", file=self._stream, flush=True)

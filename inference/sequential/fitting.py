@@ -66,6 +66,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
                     f"training {config.estimator.name} to look elsewhere, as the best fit leaves a misfit", 0, 0
                 )
                 guess = learner.learn(takes_of(study, polishing.noise), [], theta, points, numbers, proposals, k)
+                study.progress(f"searching from where {config.estimator.name} looks", 0, 0)
                 polishing.look_from(guess.sample(GUESSES, np.random.default_rng([seed, 4049])))
             within = None
             if k == 0 < rounds - 1 and proposals.kind == "truncated":
@@ -81,6 +82,7 @@ def _fit(study: Study, noise: Noise, simulated: list[str]) -> FitResult:
                 break
             proposals.add(posterior, *store.tried(upto), within)
         best, noise = polishing.best, polishing.noise
+        study.progress("asking what chance and the time step do to the best fit", 0, 0)
         found = doubts(pool, space, best.unit, noise)
         simulations = problem.told_as(upto * len(simulated) + polishing.simulations)
     samples = posterior.sample(SAMPLES, np.random.default_rng([seed, rounds]))

@@ -90,7 +90,7 @@ class FitResult:
             )
         if self.left > _MUCH:
             more = self.counted / self.left
-            lasting = f", {_times(more)} times over, as it lasts" if more > _MUCH else ""
+            lasting = f", counted {_times(more)} times, as it lasts" if more > _MUCH else ""
             lines.append(
                 f"  the best fit leaves {_times(self.left)} times the squares that noise leaves: ± and the posterior "
                 f"take what is more for noise{lasting}; muslin compare says where it is"

@@ -29,7 +29,7 @@ def told_together(objective: Objective, best: Polished) -> Polished:
     """
     if best.left < MISFIT or not best.jacobian.any():  # of parameters that do nothing there are no scores
         return best
-    scores = [_by_frame(objective, best, k) for k in range(len(objective.recordings))]
+    scores = _by_frame(objective, best)
     known = best.covariance / best.grown
     curvature = float(np.sum(known * (best.jacobian.T @ best.jacobian)))
     largest, parts = 0.0, 1
@@ -42,15 +42,16 @@ def told_together(objective: Objective, best: Polished) -> Polished:
     return replace(best, together=largest)
 
 
-def _by_frame(objective: Objective, best: Polished, k: int) -> FloatArray:
-    """Scores ``(T, D)`` of recording ``k`` of the objective; those of its offsets go with the first frame."""
-    recordings = [objective.pool.problem.recordings[name] for name in objective.recordings]
-    frames = [by_residual(r, objective.offsets, np.arange(r.series.frames, dtype=float)) for r in recordings]
-    start = sum(len(f) for f in frames[:k])
-    rows = slice(start, start + len(frames[k]))
-    each = best.jacobian[rows] * best.white[rows, None]
-    count = recordings[k].series.frames
-    return np.stack([np.bincount(frames[k].astype(np.int64), column, count) for column in each.T], axis=1)
+def _by_frame(objective: Objective, best: Polished) -> list[FloatArray]:
+    """Scores ``(T, D)`` of every recording; those of its offsets go with its first frame."""
+    each, out = best.jacobian * best.white[:, None], list[FloatArray]()
+    for name in objective.recordings:
+        recording = objective.pool.problem.recordings[name]
+        count = recording.series.frames
+        frames = by_residual(recording, objective.offsets, np.arange(count, dtype=float)).astype(np.int64)
+        own, each = each[: len(frames)], each[len(frames) :]
+        out.append(np.stack([np.bincount(frames, column, count) for column in own.T], axis=1).astype(float))
+    return out
 
 
 def _summed(scores: FloatArray, parts: int) -> FloatArray:

@@ -30,18 +30,18 @@ def test_what_a_model_misses_makes_its_posterior_as_much_wider(tmp_path: Path) -
     study = Study.load(write_study(tmp_path, small_measurement(drag)), workers=0)
     result = study.fit()
     assert result.counted > 4.0 * result.left > 16.0
-    assert "times the squares that noise leaves" in result.text() and "times over, as it lasts" in result.text()
+    assert "times the squares that noise leaves" in result.text() and "times, as it lasts" in result.text()
     told = np.sqrt(np.diag(read(study.results()["fit"], "estimate_covariance")))
     width = study.problem.space.to_unit(result.samples).std(axis=0) / told
     assert np.all((width > 0.5) & (width < 2.0)), width
 
 
 def test_a_misfit_does_not_lead_the_posterior_astray(tmp_path: Path) -> None:
-    """Seen as it is, what this model misses takes the estimator 36 standard deviations away from the best fit."""
+    """Counted once, and seen as it is, what this model misses takes the estimator 36 standard deviations away."""
     tilt = REGISTRY.get("effect", "gravity-tilt")(about_x=0.03, about_y=0.0)
     result = Study.load(write_study(tmp_path, small_measurement(tilt, seed=1)), workers=0).fit()
     assert result.left > 4.0
-    assert np.all(np.abs(result.samples.mean(axis=0) - result.estimate) < 12.0 * result.sd)
+    assert np.all(np.abs(result.samples.mean(axis=0) - result.estimate) < 3.0 * result.sd)
 
 
 def test_a_posterior_that_reaches_the_end_of_where_draws_came_from_is_told_so(

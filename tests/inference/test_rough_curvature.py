@@ -84,6 +84,16 @@ def test_no_less_is_known_than_the_prior_says() -> None:
     assert (np.diag(best.covariance) <= 1.0 / 12.0 + 1e-12).all()
 
 
+def test_luck_that_a_covariance_is_grown_by_is_told() -> None:
+    """So that it can be taken off again, where another reason counts instead of it."""
+    objective = Rough(0, 0.4)
+    plain = polish(objective, np.array([0.5, 0.5]))
+    told = seen_past_chance(objective, plain)
+    by_slopes = told.covariance / told.grown
+    assert told.grown > 1.2
+    assert (np.diag(by_slopes) < np.diag(told.covariance)).all() and plain.grown == 1.0
+
+
 def test_nothing_changes_where_neighbours_cannot_be_simulated() -> None:
     objective = Rough(5, 0.4)
     best = polish(objective, np.array([0.5, 0.5]))
