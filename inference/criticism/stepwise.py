@@ -10,6 +10,7 @@ from .pairs import Pair, level_with_first, partners, promising_pairs
 from .settle import settled
 from .stage import MORE_EVALUATIONS, Stage, run_stage
 from .verdict import (
+    HELD_OUT_SHARE,
     HELD_OUT_SLACK,
     MARGIN,
     SHARE_LEFT,
@@ -216,11 +217,10 @@ def _with_another(work: Work, names: list[str], found: Findings, pairs: list[Pai
     beside = {lead.name: second} | {n: _beside(work, first.candidate(n), second) for n in others}
     order = sorted(beside, key=lambda n: beside[n].rss)
     e, ahead = stage.evidence, beside[order[0]]
-    # one that is behind where it was fitted, and ahead where it was not, is not ruled out
-    near = [
-        n for n in order
-        if e.level(beside[n], ahead) or beside[n].held_out_white <= ahead.held_out_white
-    ]  # fmt: skip
+    # one that is behind where it was fitted, and not where it was not, is not ruled out; where both miss held-out
+    # motions by much, the one that misses them by a little more may be the right one
+    held_out = ahead.held_out_white + HELD_OUT_SHARE * max(0.0, ahead.held_out_white - 1.0)
+    near = [n for n in order if e.level(beside[n], ahead) or beside[n].held_out_white <= held_out]
     if len(near) > 1:
         rivals = tuple(((n, second.name), beside[n]) for n in near)
         return Findings("tied", tuple(near), first, stage, ahead, further=(second.name,), rivals=rivals)

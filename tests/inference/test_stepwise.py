@@ -64,7 +64,7 @@ def found(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tu
             return Stage(effects, bench.polished(("tilt", "drag"), start, 1), {}, e, Decision("no-misfit", ()))
         space = bench.space((*effects, "drag"))
         fit = bench.polished((*effects, "drag"), np.full(3, 0.5), 1)
-        drag = Candidate("drag", space, 2, fit, {"other": 0.003}, 1.0, refitted=True)
+        drag = Candidate("drag", space, 2, fit, {"other": 0.003}, request.param[4], refitted=True)
         e = evidence(alone, drag)
         named = Decision("named", ("drag",)) if with_tilt < 0.95 * alone else Decision("none", ())
         return Stage(effects, candidate("x", alone).fit, {}, e, named)
@@ -89,9 +89,11 @@ def look(c: Candidate) -> Look:
     return Look(c.name, c.space, start, c.fit.white, np.zeros((len(c.fit.white), 2)), start, c.rss, 0.1, 1.0)
 
 
-def outcome(alone: float, with_tilt: float, with_wind: float, held_out: float = 2.0) -> pytest.MarkDecorator:
-    """What is left of a misfit of 9; and held out, wind and drag together, where tilt and drag leave 1."""
-    return pytest.mark.parametrize("found", [(alone, with_tilt, with_wind, held_out)], indirect=True)
+def outcome(
+    alone: float, with_tilt: float, with_wind: float, held_out: float = 2.0, tilt_held_out: float = 1.0
+) -> pytest.MarkDecorator:
+    """What is left of a misfit of 9; and held out, wind and drag together, and tilt and drag."""
+    return pytest.mark.parametrize("found", [(alone, with_tilt, with_wind, held_out, tilt_held_out)], indirect=True)
 
 
 @outcome(2.0, 1.0, 1.8)
@@ -115,6 +117,16 @@ def test_or_leave_them_tied_and_be_missing_beside_either(found: tuple[Findings, 
 @outcome(2.0, 1.0, 1.8, held_out=0.9)
 def test_what_does_better_on_other_motions_is_not_ruled_out(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
     assert (found[0].verdict, found[0].effects, found[0].further) == ("tied", ("tilt", "wind"), ("drag",))
+
+
+@outcome(2.0, 1.0, 1.8, held_out=5.1, tilt_held_out=5.0)
+def test_nor_what_misses_them_by_much_as_the_other_does(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects, found[0].further) == ("tied", ("tilt", "wind"), ("drag",))
+
+
+@outcome(2.0, 1.0, 1.8, held_out=6.0, tilt_held_out=5.0)
+def test_but_what_misses_them_by_more(found: tuple[Findings, list[tuple[str, ...]]]) -> None:
+    assert (found[0].verdict, found[0].effects) == ("named", ("tilt", "drag"))
 
 
 @outcome(2.0, 2.0, 2.0)
