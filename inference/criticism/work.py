@@ -15,6 +15,7 @@ from ..rough_curvature import seen_past_chance
 from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.polishing import offsets_of
 from ..sequential.result import FitResult
+from ..sequential.together import told_together
 from .candidate import Candidate, root_mean_square
 from .held_out import HeldOut, held_out_residuals
 from .numerics import numerics
@@ -169,13 +170,16 @@ class Work:
     def told(self, candidate: Candidate) -> Candidate:
         """With what is known of its coefficients where chance moves them, and where a misfit stays.
 
-        A misfit that stays beside what numerics may be off by is not like these, so what they take off may not be right
-        either. How far the fit goes if they take off nothing counts as doubt, by the share of what is left that is no
-        noise: a right model goes no farther than its covariance says (Hausman, *Specification tests*, 1978).
+        A misfit that stays counts as often as it goes together in time, as in a fit. Beside what numerics may be off by
+        it is not like these, so what they take off may not be right either. How far the fit goes if they take off
+        nothing counts as doubt, by the share of what is left that is no noise: a right model goes no farther than its
+        covariance says (Hausman, *Specification tests*, 1978).
         """
         effects = self._effects_of(candidate)
-        seen = seen_past_chance(self.objective(effects), self._again(effects, candidate.fit))
-        candidate = replace(candidate, fit=replace(candidate.fit, covariance=seen.covariance))
+        objective = self.objective(effects)
+        seen = told_together(objective, seen_past_chance(objective, self._again(effects, candidate.fit)))
+        told = replace(candidate.fit, covariance=seen.covariance, grown=seen.grown, together=seen.together)
+        candidate = replace(candidate, fit=told)
         if candidate.fit.left < MISFIT:
             return candidate
         share = 1.0 - 1.0 / candidate.fit.left

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_verdict import candidate
 
+from muslin.core.arrays import FloatArray
 from muslin.core.measurement import Recording
 from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.core.rollout import Trajectory
@@ -31,11 +32,13 @@ SPACE = ParameterSpace((Parameter("a", "1", 0.0, 1.0),))
 class Pool:
     """Simulates a wave as high as its parameter."""
 
-    problem = SimpleNamespace(recordings={"r": Recording("r", PointSeries(TIME, BEST * WAVE + 0.2 * OTHER))})
+    def __init__(self, seen: PointSeries | None = None, wave: FloatArray = WAVE) -> None:
+        self.seen, self.wave = seen or PointSeries(TIME, BEST * WAVE + 0.2 * OTHER), wave
+        self.problem = SimpleNamespace(recordings={"r": Recording("r", self.seen)})
 
     def map(self, tasks: list[SimpleNamespace]) -> list[Trajectory]:
-        made = [PointSeries(TIME, sum(task.values.values()) * WAVE) for task in tasks]
-        return [Trajectory(series, series.points, np.zeros((len(TIME), 1, 7))) for series in made]
+        made = [PointSeries(self.seen.time, sum(task.values.values()) * self.wave) for task in tasks]
+        return [Trajectory(series, series.points, np.zeros((len(series.time), 1, 7))) for series in made]
 
 
 def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
@@ -61,8 +64,7 @@ def test_a_misfit_that_numerics_do_not_explain_casts_doubt_on_what_they_take_off
     """Doubt goes as far as the fit goes without them, where what is left is no noise."""
     aside = np.array([0.0, 0.05, 0.0])  # what nothing explains
     noise = 0.001 * np.random.default_rng(0).normal(size=WAVE.shape)
-    seen = Recording("r", PointSeries(TIME, BEST * WAVE + misfit * (OTHER + aside) + noise))
-    pool = SimpleNamespace(problem=SimpleNamespace(recordings={"r": seen}), map=Pool().map)
+    pool = Pool(PointSeries(TIME, BEST * WAVE + misfit * (OTHER + aside) + noise))
     space = ParameterSpace((Parameter("drag.a", "1", 0.0, 1.0),))
     numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
     work = SimpleNamespace(
@@ -80,6 +82,30 @@ def test_a_misfit_that_numerics_do_not_explain_casts_doubt_on_what_they_take_off
         assert sd == pytest.approx(abs(mean - plain.unit[0]), rel=0.05)
     else:
         assert sd == found.coefficients["a"][1] and abs(mean - BEST) < 3 * sd
+
+
+@pytest.mark.parametrize("lasts", [False, True])
+def test_a_misfit_that_lasts_makes_coefficients_less_certain(lasts: bool) -> None:
+    """Of misfits of one size, shorter than the recording, errors are as large as they are told to be, in the mean."""
+    space, time = ParameterSpace((Parameter("drag.a", "1", 0.0, 1.0),)), np.linspace(0.0, 30.0, 600)
+    wave = np.stack([np.sin(3 * time), np.cos(2 * time)], axis=1)[:, :, None] * (0.05, 0.0, 0.02)  # (T, 2, 3)
+    errors, by_size = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        phase, frequency = rng.uniform(0, 2 * np.pi, wave.shape[1:]), rng.uniform(2, 5, wave.shape[1:])
+        slow = 2**0.5 * np.sin(frequency * time[:, None, None] + phase)
+        off = 0.01 * (slow if lasts else rng.normal(size=wave.shape)) + 0.001 * rng.normal(size=wave.shape)
+        objective = Objective(Pool(PointSeries(time, BEST * wave + off), wave), space, ("r",), NOISE, Offsets())  # type: ignore[arg-type]
+        work = SimpleNamespace(discrepancy=Discrepancy(), _effects_of=lambda c: (), objective=lambda e, o=objective: o)
+        work._again, work.as_a_user_fits = partial(Work._again, work), partial(Work.as_a_user_fits, work)
+        found = candidate("drag", 1.0)
+        found.__dict__.update(space=space, base=0, fit=polish(objective, np.array([0.8]), 8))
+        assert found.fit.left > 10.0
+        mean, sd, _ = Work.told(work, found).coefficients["a"]  # type: ignore[arg-type]
+        errors.append((mean - BEST) ** 2 / sd**2)
+        by_size.append((mean - BEST) ** 2 / found.coefficients["a"][1] ** 2)
+    assert 0.3 < np.mean(errors) < 2.0
+    assert (np.mean(by_size) > 4.0) == lasts
 
 
 @pytest.mark.parametrize("ar1", [0.0, 0.5])
