@@ -165,10 +165,12 @@ def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArr
     first, last = (rotate(poses[:, g, 3:], np.broadcast_to(up, (len(poses), 3))) for g in (0, 1))
     carried = np.empty_like(tangents)
     carried[:, 0] = _across(first, tangents[:, 0])
+    sums = tangents[:, :-1] + tangents[:, 1:]
+    steep = 1.0 / np.maximum(1.0 + _dot(tangents[:, :-1], tangents[:, 1:]), 1e-9)
     for k in range(1, tangents.shape[1]):
-        old, new, axis = tangents[:, k - 1], tangents[:, k], carried[:, k - 1]
-        bend = np.sum(axis * new, axis=1) / np.maximum(1.0 + np.sum(old * new, axis=1), 1e-9)
-        carried[:, k] = _across(axis - bend[:, None] * (old + new), new)
+        axis, new = carried[:, k - 1], tangents[:, k]
+        bend = _dot(axis, new) * steep[:, k - 1]
+        carried[:, k] = _across(axis - bend[:, None] * sums[:, k - 1], new)
     beside = np.cross(tangents, carried)
     wanted = _across(last, tangents[:, -1])
     angle = np.arctan2(np.sum(wanted * beside[:, -1], axis=1), np.sum(wanted * carried[:, -1], axis=1))
@@ -200,8 +202,13 @@ def curves(points: FloatArray, fine: int = 6) -> tuple[FloatArray, IntArray]:
 
 
 def _across(vectors: FloatArray, tangents: FloatArray) -> FloatArray:
-    return _unit(vectors - np.sum(vectors * tangents, axis=1, keepdims=True) * tangents)
+    return _unit(vectors - _dot(vectors, tangents)[:, None] * tangents)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+    return np.asarray(vectors / np.maximum(np.sqrt(_dot(vectors, vectors)), 1e-300)[..., None])
+
+
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Of three numbers each, in the last axis: quicker than a sum of their products."""
+    return np.asarray(np.einsum("...x,...x->...", a, b))
