@@ -23,8 +23,8 @@ from ..core.scenarios import PRESETS
 from ..core.video_frames import VideoFrames
 from ..core.video_store import load_videos
 from .console import ProgressView, command, next_step, say
+from .imported import summary
 from .output import check_output
-from .recordings import summary
 
 _OPTION = "An option of the extractor; once each. Numbers, true, false and [lists] are taken as such."
 

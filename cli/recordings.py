@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from ..core.dataset import Dataset, DatasetNote, cropped
@@ -15,11 +14,10 @@ from ..core.errors import InputError
 from ..core.importing import ImportOptions, import_together
 from ..core.measurement import Measurement, Recording
 from ..core.measurement_store import save_measurement
-from ..core.pose_span import uncovered
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS
-from ..core.series import seconds
 from .console import command, next_step, say
+from .imported import say_recordings
 from .per_file import once_or_each, per_file
 from .videos import all_videos, import_videos
 
@@ -204,10 +202,7 @@ def import_files(
     measurement = Measurement(tuple(recordings))
     save_measurement(measurement, output, overwrite=force)
     say(f"wrote {output}")
-    for recording in measurement.recordings:
-        say("  " + summary(recording))
-        for remark in uncovered(recording):
-            say(f"    warning: {remark}")
+    say_recordings(measurement.recordings)
     next_step(
         command("new", "study.toml", "--measurement", output, "--scenario", scenario, "--simulator", "mujoco"),
         note=f"scenarios: {', '.join(PRESETS)}",
@@ -254,26 +249,3 @@ def _of_dataset(
     starts = once_or_each(start, len(recordings), "--start", "take")
     stops = once_or_each(stop, len(recordings), "--stop", "take")
     return [cropped(r, a, b) for r, a, b in zip(recordings, starts, stops, strict=True)]
-
-
-def summary(recording: Recording) -> str:
-    """One line about a recording."""
-    series = recording.series
-    frames, count, axes = series.points.shape
-    seen = float(np.mean(np.isfinite(series.points).any(axis=2)))
-    measured = [a for a in range(axes) if np.isfinite(series.points[..., a]).any()]
-    span = [np.nanmax(series.points[..., a]) - np.nanmin(series.points[..., a]) for a in measured]
-    extent = " x ".join(f"{s:.3g}" for s in span)
-    which = "" if len(measured) == 3 else f" ({', '.join('xyz'[a] for a in measured)})"
-    parts = [
-        f"{recording.name}: {frames} frames from {seconds(series.time[0])} to {seconds(series.time[-1])} s",
-        f"{count} points{'' if series.correspondence else ' without correspondence'}, {seen:.1%} seen",
-        f"within {extent} {series.unit}{which}",
-    ]
-    if recording.camera is not None:
-        parts.append(f"camera of {recording.camera.width} x {recording.camera.height} pixels")
-    if recording.gripper is not None:
-        parts.append(f"{recording.gripper.grippers} gripper(s)")
-    if recording.load:
-        parts.append(f"load {recording.load:g} kg")
-    return ", ".join(parts)
