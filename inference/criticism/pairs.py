@@ -13,12 +13,13 @@ from .stage import FIRST_EVALUATIONS, Stage
 from .verdict import SIGNIFICANT
 from .work import Work
 
-#: A candidate leads if alone it explains at least this share of the misfit; so many leaders are paired with each other,
-LEADING, LEADERS = 0.2, 4
-#: and so many pairs more are tried that promise most in a linear model.
-PROMISING = 4
+#: A candidate leads if alone it explains at least this share of the misfit; so many leaders are paired with others, and
+#: so many of these pairs are tried, those that promise most.
+LEADING, LEADERS, TRIED = 0.2, 4, 10
 #: Pairs that are looked at closer, and evaluations of each.
 CLOSER, CLOSER_EVALUATIONS = 3, 8
+#: Responses that differ by less than this share of the largest count as one.
+ALIKE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +76,10 @@ def level_with_first(stage: Stage, pairs: Sequence[Pair]) -> tuple[Pair, ...]:
 
 
 def partners(stage: Stage, lead: str, count: int) -> list[str]:
-    """The ``count`` candidates that promise most beside the lead in a linear model of what is left without both."""
-    look = stage.looks[lead]
-    promised = {n: _promise([look, other])[1] for n, other in stage.looks.items() if n != lead and other.responds}
+    """The ``count`` candidates that promise most beside the lead; see :func:`_promise`."""
+    first = stage.candidate(lead)
+    others = [c for c in stage.evidence.candidates if c.name != lead and stage.looks[c.name].responds]
+    promised = {c.name: _promise(stage, first, c) for c in others}
     return sorted(promised, key=promised.__getitem__)[:count]
 
 
@@ -92,22 +94,29 @@ def _fitted(work: Work, lead: Candidate, other: Candidate, start: FloatArray, ev
 
 
 def _chosen(stage: Stage) -> list[tuple[Candidate, Candidate]]:
-    """Which pairs are tried, each with the candidate first that explains more."""
+    """Which pairs are tried, the most promising first, each with the candidate first that explains more."""
     e = stage.evidence
     order = sorted((c for c in e.candidates if stage.looks[c.name].responds), key=lambda c: c.rank)
     leaders = [c for c in order if e.explained(c) > LEADING and e.z(c) > SIGNIFICANT][:LEADERS]
-    pairs = list(combinations(leaders, 2))
-    others = [(a, b) for a, b in combinations(order, 2) if a in leaders and b not in leaders]
-    promised = {pair: _promise([stage.looks[c.name] for c in pair])[1] for pair in others}
-    return pairs + sorted(others, key=promised.__getitem__)[:PROMISING]
+    pairs = [(a, b) for a, b in combinations(order, 2) if a in leaders]
+    promised = {(a, b): min(_promise(stage, *p) for p in ((a, b), (b, a))) for a, b in pairs}
+    return sorted(pairs, key=promised.__getitem__)[:TRIED]
 
 
-def _promise(looks: Sequence[Look]) -> tuple[FloatArray, float]:
-    """Where a linear model with the effects of all ``looks`` has its least square, and that square."""
-    one, base = looks[0], looks[0].base
-    start = np.concatenate([one.start[:base], *(look.start[base:] for look in looks)])
-    jacobian = np.hstack([one.jacobian[:, :base], *(look.jacobian[:, base:] for look in looks)])
-    return least_square(start, one.white, jacobian)
+def _promise(stage: Stage, at: Candidate, other: Candidate) -> float:
+    """Squares that are left if the other one's response is added where the first one is alone [noise variances].
+
+    The response is what the other one did to the residuals where it was found, and its derivatives there and at the
+    plain fit: of one with a threshold, a grasp that slips or a rope that yields, no derivative tells before it is
+    passed. It may be of any size.
+    """
+    look = stage.looks[other.name]
+    ways = [at.fit.jacobian, other.fit.jacobian[:, other.base :], look.jacobian[:, look.base :]]
+    along = np.hstack([*ways, (other.fit.white - stage.plain.white)[:, None]])
+    sizes = np.linalg.norm(along, axis=0)
+    basis, singular, _ = np.linalg.svd(along[:, sizes > 0.0] / sizes[sizes > 0.0], full_matrices=False)
+    told = basis[:, singular > ALIKE * singular.max(initial=0.0)].T @ at.fit.white
+    return at.rss - float(told @ told)
 
 
 def _starts(work: Work, stage: Stage, lead: Candidate, other: Candidate) -> FloatArray:
@@ -115,5 +124,12 @@ def _starts(work: Work, stage: Stage, lead: Candidate, other: Candidate) -> Floa
     names = work.space((lead.name, other.name)).names
     alone = dict(zip(other.space.names, other.fit.unit, strict=True))
     alone |= dict(zip(lead.space.names, lead.fit.unit, strict=True))
-    linear, _ = _promise([stage.looks[c.name] for c in (lead, other)])
-    return np.array([[alone[n] for n in names], linear])
+    return np.array([[alone[n] for n in names], _linear([stage.looks[c.name] for c in (lead, other)])])
+
+
+def _linear(looks: Sequence[Look]) -> FloatArray:
+    """Where a linear model with the effects of all ``looks`` has its least square ``(D,)``."""
+    one, base = looks[0], looks[0].base
+    start = np.concatenate([one.start[:base], *(look.start[base:] for look in looks)])
+    jacobian = np.hstack([one.jacobian[:, :base], *(look.jacobian[:, base:] for look in looks)])
+    return least_square(start, one.white, jacobian)[0]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from .candidate import Candidate, best_starts
-from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, from_there_too
+from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, falls_short, from_there_too
 from .verdict import MARGIN, Evidence, decide, objection
 from .work import Work
 
@@ -29,13 +29,15 @@ def settled(work: Work, stage: Stage) -> Stage:
     leader = min(_passing(stage.evidence) or stage.evidence.candidates, key=lambda c: c.rank)
     if stage.evidence.explained(leader) < HOPEFUL:
         return stage
-    evidence = _with(stage.evidence, _fitted_on(work, stage, leader))
+    short = not stage.effects and falls_short(stage.plain, leader)
+    until = work.before_pairs if short else float("inf")
+    evidence = _with(stage.evidence, _fitted_on(work, stage, leader, until))
     reached = evidence.explained(evidence.nearest)
     if evidence.left(evidence.nearest) > 0.0:
         near = [c for c in evidence.candidates if c.refitted and c.name != leader.name]
         for c in sorted(near, key=lambda c: c.rank):
             if evidence.explained(c) >= NEARLY * reached:
-                evidence = _with(evidence, _fitted_on(work, stage, c))
+                evidence = _with(evidence, _fitted_on(work, stage, c, until))
     best, plain = evidence.nearest, stage.plain
     if best.rss < stage.evidence.nearest.rss:
         plain = from_there_too(work, stage.effects, plain, best)
@@ -44,13 +46,13 @@ def settled(work: Work, stage: Stage) -> Stage:
     return replace(stage, plain=plain, evidence=evidence, decision=decide(evidence))
 
 
-def _fitted_on(work: Work, stage: Stage, c: Candidate) -> Candidate:
-    """Polished further, and where that leaves a misfit, from other parameters too."""
+def _fitted_on(work: Work, stage: Stage, c: Candidate, until: float) -> Candidate:
+    """Polished further, and where that leaves a misfit, from other parameters too; not after ``until`` rollouts."""
     effects = (*stage.effects, c.name)
-    if (stage.evidence.left(c) > 0.0 or not c.refitted) and not c.fit.rested and work.may_go_on():
+    if (stage.evidence.left(c) > 0.0 or not c.refitted) and not c.fit.rested and work.may_go_on(until):
         fit = work.polished(effects, c.fit.unit, MORE_EVALUATIONS)
         c = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True)
-    if stage.evidence.left(c) > 0.0 and work.may_go_on():
+    if stage.evidence.left(c) > 0.0 and work.may_go_on(until):
         rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
         points = np.repeat(c.fit.unit[None], PLACES, axis=0)
         points[:, : c.base] = stats.qmc.Sobol(c.base, rng=rng).random(PLACES)

@@ -10,7 +10,7 @@ from ...core.arrays import FloatArray
 from ..polish import Polished
 from .candidate import Candidate, best_starts, drop_z, screening_points
 from .linear import Look, least_square, look_at
-from .verdict import MARGIN, SIGNIFICANT, Decision, Evidence, Objection, decide, has_misfit, objection
+from .verdict import EXPLAINS, MARGIN, SIGNIFICANT, Decision, Evidence, Objection, decide, has_misfit, objection
 from .work import Work
 
 #: Least-squares evaluations for a candidate that passed the screening, for a contender on top, for the plain model at
@@ -102,6 +102,11 @@ def from_there_too(work: Work, effects: tuple[str, ...], plain: Polished, best: 
     return min(plain, there, key=lambda p: p.rss)
 
 
+def falls_short(plain: Polished, best: Candidate) -> bool:
+    """Does what got farthest explain too little to be named alone? Then the answer may be two."""
+    return plain.rss - best.rss < EXPLAINS * (plain.rss - plain.count)
+
+
 def _seen_only(look: Look, plain: Polished) -> Candidate:
     """A candidate that was looked at and no more."""
     fit = look.as_fit(plain, look.start, plain.white)
@@ -159,9 +164,12 @@ class _Tournament:
             found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         order = sorted(found.values(), key=lambda c: c.rank)
         most = self.plain.rss - order[0].rss
+        until = float("inf")
         for k, c in enumerate(order):
             near = self.plain.rss - c.rss > (FAR_BEHIND if k < FINALISTS else NEARLY) * most
-            if (k == 0 or near) and self.work.may_go_on():
+            if k == 1 and not self.effects and falls_short(self.plain, found[order[0].name]):
+                until = self.work.before_pairs
+            if (k == 0 or near) and self.work.may_go_on(until):
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)

@@ -26,6 +26,8 @@ RESERVED = 0.15
 #: Simulations of a diagnosis for every recording that is fitted, and at least, by kind of object; ropes are quick.
 A_RECORDING = {"rope": 1250, "cloth": 440, "solid": 500}
 AT_LEAST = {"rope": 1250, "cloth": 880, "solid": 1000}
+#: Share of what the search has that is kept for pairs, where no effect alone is the answer.
+PAIRED = 0.15
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 
@@ -74,6 +76,11 @@ class Work:
     def simulations(self) -> int:
         """What those are told as."""
         return self.problem.told_as(self.count)
+
+    @property
+    def before_pairs(self) -> float:
+        """Rollouts after which nothing that can wait keeps pairs of effects from being tried."""
+        return (1.0 - PAIRED) * self.limit
 
     def may_go_on(self, until: float = float("inf")) -> bool:
         """Is something left of the budget, ``until`` so many? That it was not is remembered: :attr:`cut_short`."""

@@ -16,10 +16,12 @@ from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.discrepancy import NONE
 from muslin.inference.polish import Polished, polish
 
-#: What each effect does to 400 residuals, in the order of the fits alone; slip does nothing below 0.2.
-EFFECTS = ("tilt", "slip", "wind", "lag")
-PATTERNS = dict(zip(EFFECTS, np.linalg.qr(np.random.default_rng(3).normal(size=(400, 4)))[0].T * 60.0, strict=True))
-TRUTH = {"tilt": 0.4, "slip": 0.6}
+#: What each effect does to 400 residuals, in the order of the fits alone; slip does nothing below 0.2, and sway is much
+#: like tilt.
+EFFECTS = ("tilt", "slip", "wind", "lag", "sway")
+PATTERNS = dict(zip(EFFECTS, np.linalg.qr(np.random.default_rng(3).normal(size=(400, 5)))[0].T * 60.0, strict=True))
+PATTERNS["sway"] = 0.9 * PATTERNS["tilt"] + 0.4 * PATTERNS["sway"]
+TRUTH = {"tilt": 0.7, "slip": 0.6}
 NOISE = np.random.default_rng(4).normal(size=400)
 
 
@@ -96,8 +98,19 @@ def test_the_pair_that_is_missing_comes_first(misfit: Stage) -> None:
     pairs = promising_pairs(Bench(), misfit)  # type: ignore[arg-type]
     assert set(pairs[0].names) == set(TRUTH)
     assert pairs[0].lead.rss == min(c.rss for c in misfit.evidence.candidates)
-    assert pairs[0].values == pytest.approx({"stiffness": 0.5, "tilt.strength": 0.4, "slip.strength": 0.6}, abs=0.1)
+    assert pairs[0].values == pytest.approx({"stiffness": 0.5, "tilt.strength": 0.7, "slip.strength": 0.6}, abs=0.1)
     assert pairs[0].both.rss < 1.2 * pairs[0].both.fit.count < min(p.both.rss for p in pairs[1:])
+
+
+def test_what_a_candidate_did_where_it_was_found_says_which_pair_to_try(misfit: Stage) -> None:
+    """Tilt and sway explain most, but the same; and slip does nothing to the model without it, however far it is moved
+    by derivatives."""
+    looks = misfit.looks | {"slip": replace(misfit.looks["slip"], jacobian=1e-3 * misfit.looks["slip"].jacobian)}
+    alone = sorted(misfit.evidence.candidates, key=lambda c: c.rank)
+    assert [c.name for c in alone[:2]] == ["tilt", "sway"]
+    bench = Bench(most=1)
+    promising_pairs(bench, replace(misfit, looks=looks))  # type: ignore[arg-type]
+    assert bench.fits == [("tilt", "slip")]
 
 
 def test_one_that_leaves_only_noise_ends_the_search(stage: Stage) -> None:

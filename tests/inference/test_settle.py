@@ -22,12 +22,14 @@ class Bench:
     Held-out motions move by ``shift`` [noise variances] with any effect.
     """
 
+    count, before_pairs = 0, 100.0
+
     def __init__(self, floors: dict[str, float], budget: bool = True, shift: float = np.inf) -> None:
         self.floors, self.budget, self.shift, self.asked = floors, budget, shift, list[str]()
         self.study = SimpleNamespace(config=SimpleNamespace(study=SimpleNamespace(seed=1)))
 
-    def may_go_on(self) -> bool:
-        return self.budget
+    def may_go_on(self, until: float = np.inf) -> bool:
+        return self.budget and self.count < until
 
     def polished(self, effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
         name = effects[-1] if effects else "plain"
@@ -98,6 +100,14 @@ def test_what_passes_without_a_refit_is_refitted_before_it_is_named() -> None:
     assert before.decision == Decision("cannot-tell", (), unfinished=True)
     after = settled(Bench({"drag": COUNT, "plain": 9 * COUNT}), before)  # type: ignore[arg-type]
     assert (after.decision.verdict, after.decision.effects) == ("named", ("drag",)) and after.chosen.refitted
+
+
+@pytest.mark.parametrize("alone, asked", [(4.0 * COUNT, []), (1.5 * COUNT, ["drag"])])
+def test_what_is_kept_for_pairs_is_not_spent_on_one_that_explains_too_little(alone: float, asked: list[str]) -> None:
+    bench = Bench({"drag": COUNT, "plain": 9 * COUNT})
+    bench.count = 101
+    settled(bench, stage(candidate("drag", alone)))  # type: ignore[arg-type]
+    assert [name for name in dict.fromkeys(bench.asked) if name != "plain"] == asked
 
 
 def test_nothing_is_done_without_a_budget_or_a_refit() -> None:

@@ -12,7 +12,7 @@ from muslin.core.arrays import FloatArray
 from muslin.inference.criticism import work
 from muslin.inference.criticism.diagnose import _rest
 from muslin.inference.criticism.linear import Look
-from muslin.inference.criticism.stage import Stage, _leaders, _Tournament, from_there_too
+from muslin.inference.criticism.stage import MORE_EVALUATIONS, Stage, _leaders, _Tournament, from_there_too
 from muslin.inference.criticism.verdict import Decision, decide
 from muslin.inference.criticism.work import Work, usual_simulations
 from muslin.inference.polish import Polished
@@ -95,6 +95,28 @@ def test_the_leader_is_refitted_though_finding_it_took_long() -> None:
     (found,) = tournament.run()
     assert refitted == [("drag",)] and found.refitted and found.rss == pytest.approx(COUNT)
     assert found.tried
+
+
+@pytest.mark.parametrize("explains_enough", [True, False])
+def test_rivals_are_refitted_before_pairs_are_tried_only_where_one_may_be_named(explains_enough: bool) -> None:
+    reached = {"drag": (1.5 if explains_enough else 1.9) * COUNT, "lag": 1.95 * COUNT}
+    refitted = []
+
+    def polished(effects: tuple[str, ...], unit: FloatArray, evaluations: int, *_: object) -> Polished:
+        if evaluations == MORE_EVALUATIONS:
+            refitted.append(effects[-1])
+        return candidate(effects[-1], reached[effects[-1]]).fit
+
+    work, tournament = bench(polished)
+    work.before_pairs, work.count, tournament.until = 850, 900, 1000
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
+    without = candidate("plain", (6.0 if explains_enough else 3.0) * COUNT).fit.white
+    tournament.plain = replace(tournament.plain, white=without)
+    drag = tournament.looks["drag"]
+    tournament.looks["lag"] = replace(drag, name="lag", space=candidate("lag", COUNT).space)
+    tournament.rng["lag"] = np.random.default_rng(0)
+    tournament.run()
+    assert refitted == (["drag", "lag"] if explains_enough else ["drag"])
 
 
 @pytest.mark.parametrize("spent", [True, False])
