@@ -105,7 +105,7 @@ def _models(found: Findings) -> list[dict[str, Any]]:
 def _together(found: Findings, e: Evidence) -> dict[str, Any] | None:
     """Two effects that explain most where nothing is named, and others that explain as much."""
     told = [{"effects": list(p.names), "explained": e.explained(p.both)} for p in found.together]
-    return {**told[0], "alike": told[1:]} if told else None
+    return {**told[0], "alike": told[1:], "judged": not found.unjudged} if told else None
 
 
 def _rest(found: Findings, joint: Evidence, work: Work) -> str | None:

@@ -126,7 +126,11 @@ def _together(two: dict[str, Any] | None, best: dict[str, Any]) -> str:
     """What two effects at once explain, where that is more than the best one does."""
     if two is None or two["explained"] < best["explained"] + _WORTH_TELLING:
         return ""
-    but = "not enough for a name" if two["explained"] < EXPLAINS else "these data do not tell that it is these two"
+    but = "these data do not tell that it is these two"
+    if two["explained"] < EXPLAINS:
+        but = "not enough for a name"
+    elif not two["judged"]:
+        but = "the budget ended before it was known whether it is these two"
     others = [f"{' and '.join(p['effects'])} ({100 * p['explained']:.0f} %)" for p in two["alike"]]
     as_much = f": {', '.join(others[:3])} may be it as well" if others else ""
     told = f"{' and '.join(two['effects'])} explain {100 * two['explained']:.0f} %, which is more, but {but}"
@@ -202,6 +206,17 @@ def _reason(candidate: dict[str, Any], result: dict[str, Any]) -> str:
     return f"{candidate['behind']:.0f} behind {first} in -2 log likelihood"
 
 
+def _whether_these_two(study: Study, result: dict[str, Any]) -> str:
+    """What to do where the budget ended before a pair that explains enough was held against others."""
+    two = result["together"]
+    if two is None or two["judged"] or two["explained"] < EXPLAINS:
+        return ""
+    return (
+        f"To be sure: [diagnose] simulations = {2 * result['simulations']}, twice as many, tells whether it is "
+        f"{' and '.join(two['effects'])}; muslin add {','.join(two['effects'])} {study.path} makes that model now. "
+    )
+
+
 def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
     verdict = result["verdict"]
     if verdict == "tied":
@@ -215,8 +230,8 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
         best = result["candidates"][0]
         rest = f"; with muslin add {best['name']} {study.path} the rest may show" if _is_a_part(best) else ""
         return (
-            f"To learn more: muslin unknown {study.path} estimates the missing force itself, shows it on the object, "
-            f"and looks for a law{rest}."
+            f"{_whether_these_two(study, result)}To learn more: muslin unknown {study.path} estimates the missing "
+            f"force itself, shows it on the object, and looks for a law{rest}."
         )
     if result["unfinished"]:
         return "To be sure: allow several times as many simulations ([diagnose] simulations), and diagnose again."

@@ -60,6 +60,7 @@ class Findings:
         rivals: models, by their effects, that go with one of ``further`` each, or with one of the tied ones and that.
         together: where nothing was named, the two effects that left least, and others that the data cannot tell from
             them; none if no two were tried.
+        unjudged: the budget ended before it was known whether it is these two.
         doubt: of the one effect that had a name before it was looked at where it fits.
     """
 
@@ -72,6 +73,7 @@ class Findings:
     rest: Decision | None = None
     rivals: tuple[tuple[tuple[str, ...], Candidate], ...] = ()
     together: tuple[Pair, ...] = ()
+    unjudged: bool = False
     doubt: Doubt | None = None
 
 
@@ -86,7 +88,8 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
     if (verdict == "none" or _outdone(first, pairs)) and (pair := _pair(work, names, first, pairs)):
         return pair
     if verdict == "none":
-        return Findings("none", (), first, first, _nearest(first), together=level_with_first(first, pairs))
+        level = level_with_first(first, pairs)
+        return Findings("none", (), first, first, _nearest(first), together=level, unjudged=not work.may_go_on())
     found = Findings(verdict, first.decision.effects, first, first, first.chosen)
     if verdict == "tied":
         return _with_another(work, names, found, pairs) or found

@@ -9,6 +9,9 @@ import pytest
 from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest, small, untried
 from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
+TAKE = SimpleNamespace(series=SimpleNamespace(unit="m"))
+IN_METRES = SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": TAKE}))
+
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
     evidence = {"held_out": ratio**2 if held_out else None}
@@ -75,10 +78,8 @@ def test_what_hides_behind_the_noise_is_told_to_be_small() -> None:
 
 @pytest.mark.parametrize("explained, part", [(0.36, True), (0.1, False)])
 def test_what_to_do_with_a_part_of_the_answer_is_told(explained: float, part: bool) -> None:
-    take = SimpleNamespace(series=SimpleNamespace(unit="m"))
-    study = SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": take}))
     best = {"name": "wind", "explained": explained, "held_out_before": 0.0083, "held_out_after": 0.0065}
-    told = _to_be_sure(study, {"verdict": "none", "candidates": [best]})  # type: ignore[arg-type]
+    told = _to_be_sure(IN_METRES, {"verdict": "none", "candidates": [best], "together": None})  # type: ignore[arg-type]
     assert "muslin unknown s.toml" in told
     assert ("muslin add wind s.toml" in told) == part
 
@@ -91,7 +92,7 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
     def told(two: dict[str, Any] | None) -> str:
         return _verdict(none | {"together": two}, {})
 
-    pair = {"effects": ["drag", "added-mass"], "explained": 0.81, "alike": []}
+    pair = {"effects": ["drag", "added-mass"], "explained": 0.81, "alike": [], "judged": True}
     assert "Together drag and added-mass explain 81 %, which is more, but these data do not tell" in told(pair)
     assert "explain 76 %, which is more, but not enough for a name." in told(pair | {"explained": 0.76})
     as_good = [{"effects": ["wind", "added-mass"], "explained": 0.79}, {"effects": ["lag", "hem"], "explained": 0.78}]
@@ -99,6 +100,14 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
     assert "these two: wind and added-mass (79 %), lag and hem (78 %) may be it as well." in alike
     assert "Together" not in told(pair | {"explained": 0.7})
     assert "Together" not in told(None)
+    ended = pair | {"judged": False}
+    assert "which is more, but the budget ended before it was known whether it is these two." in told(ended)
+
+    def advice(two: dict[str, Any]) -> str:
+        return _to_be_sure(IN_METRES, none | {"together": two, "simulations": 800})  # type: ignore[arg-type]
+
+    assert "[diagnose] simulations = 1600" in advice(ended) and "muslin add drag,added-mass s.toml" in advice(ended)
+    assert "simulations" not in advice(pair) + advice(ended | {"explained": 0.76})
 
 
 def test_what_is_told_of_is_not_told_as_invisible() -> None:

@@ -148,7 +148,8 @@ def test_what_is_missing_beside_either_is_told() -> None:
 def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tuple[Findings, Hints]:
     """What is found where camera, grasp and tilt leave so much alone, and grasp and tilt together a number; hints.
 
-    A third number is what these two leave on held-out motions [noise variances]; the plain model leaves eleven.
+    A third number is what these two leave on held-out motions [noise variances]; the plain model leaves eleven. A
+    fourth value says that the budget has ended.
     """
     alone, together = {n: COUNT * x for n, x in request.param[0].items()}, COUNT * request.param[1]
     seen: dict[str, FloatArray] = {}
@@ -177,6 +178,7 @@ def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> t
     monkeypatch.setattr(stepwise, "settled", lambda work, stage: stage)
     pair = Pair(first.candidate("grasp"), both())
     monkeypatch.setattr(stepwise, "promising_pairs", lambda work, stage: [pair])
+    bench.may_go_on = lambda: len(request.param) < 4  # type: ignore[method-assign]
     joint = evidence(9 * COUNT, replace(both(), held_out_white=(*request.param, 1.0)[2]))
     bench.jointly = lambda *_: joint  # type: ignore[attr-defined]
     return find(bench, ["camera", "grasp", "tilt"], np.full(1, 0.5)), seen  # type: ignore[arg-type]
@@ -196,6 +198,13 @@ def test_a_pair_is_named_where_none_of_it_is_alone_or_another_stands_in_for_it(
 @pytest.mark.parametrize("paired", [(NEITHER, 4.5)], indirect=True)
 def test_a_pair_that_leaves_much_is_not_named(paired: tuple[Findings, Hints]) -> None:
     assert (paired[0].verdict, paired[0].effects) == ("none", ())
+    assert [p.names for p in paired[0].together] == [("grasp", "tilt")]
+    assert not paired[0].unjudged
+
+
+@pytest.mark.parametrize("paired", [(NEITHER, 1.0, 1.0, "spent")], indirect=True)
+def test_a_pair_that_the_budget_leaves_unjudged_is_told_as_that(paired: tuple[Findings, Hints]) -> None:
+    assert paired[0].verdict == "none" and paired[0].unjudged
     assert [p.names for p in paired[0].together] == [("grasp", "tilt")]
 
 
