@@ -1,6 +1,7 @@
 """One effect after the other: forward while something is left, in pairs where one alone is not enough, and back."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -85,11 +86,12 @@ def find(work: Work, names: list[str], start: FloatArray) -> Findings:
         return Findings(verdict, (), first, first, _nearest(first))
     left = first.evidence.left(first.evidence.nearest) > 0.0
     pairs = promising_pairs(work, first) if left else []
-    if (verdict == "none" or _outdone(first, pairs)) and (pair := _pair(work, names, first, pairs)):
-        return pair
+    two = _pair(work, names, first, pairs) if verdict == "none" or _outdone(first, pairs) else None
+    if isinstance(two, Findings):
+        return two
     if verdict == "none":
         level = level_with_first(first, pairs)
-        return Findings("none", (), first, first, _nearest(first), together=level, unjudged=not work.may_go_on())
+        return Findings("none", (), first, first, _nearest(first), together=level, unjudged=two == "unjudged")
     found = Findings(verdict, first.decision.effects, first, first, first.chosen)
     if verdict == "tied":
         return _with_another(work, names, found, pairs) or found
@@ -187,19 +189,21 @@ def _outdone(first: Stage, pairs: list[Pair]) -> bool:
     return not any(e.level(rival, best) for rival in rivals)
 
 
-def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Findings | None:
+def _pair(work: Work, names: list[str], first: Stage, pairs: list[Pair]) -> Findings | Literal["rejected", "unjudged"]:
     """Two effects of like strength hide each other: with one of them in the model, is another one named?"""
-    if not pairs or not work.may_go_on():
-        return None
+    if not pairs:
+        return "rejected"
+    if not work.may_go_on():
+        return "unjudged"
     lead = pairs[0].lead
     likely = {*partners(first, lead.name, PARTNERS), *(n for p in pairs if lead.name in p.names for n in p.names)}
     rest = [n for n in names if n in likely - {lead.name}]
     stage = _stage(work, first, (lead.name,), rest, lead.fit.unit, pairs)
     if stage.decision.verdict != "named":
-        return None
+        return "unjudged" if stage.decision.unfinished else "rejected"
     joint = work.jointly(stage.chosen, first.plain)
     if short_of_a_name(joint, joint.nearest) is not None:
-        return None
+        return "rejected"
     named = Findings("named", (lead.name, stage.chosen.name), first, stage, stage.chosen)
     return _forward(work, names, _without_idle(work, named), pairs)
 

@@ -149,9 +149,10 @@ def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> t
     """What is found where camera, grasp and tilt leave so much alone, and grasp and tilt together a number; hints.
 
     A third number is what these two leave on held-out motions [noise variances]; the plain model leaves eleven. A
-    fourth value says that the budget has ended.
+    fourth value says that the budget has ended, or ends before the second effect is refitted.
     """
     alone, together = {n: COUNT * x for n, x in request.param[0].items()}, COUNT * request.param[1]
+    ends = request.param[3] if len(request.param) > 3 else "never"
     seen: dict[str, FloatArray] = {}
     bench = Bench({("tilt",): 6 * COUNT, ("grasp",): 5 * COUNT}, 1.0)
     first = first_stage(alone)
@@ -172,13 +173,14 @@ def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> t
             return Stage(effects, candidate("x", together).fit, {}, e, Decision("no-misfit", ()))
         seen.update(hints)
         e = evidence(alone["grasp"], both())
-        return Stage(effects, first.candidate("grasp").fit, {}, e, Decision("named", ("tilt",)))
+        named = Decision("cannot-tell", (), unfinished=True) if ends == "later" else Decision("named", ("tilt",))
+        return Stage(effects, first.candidate("grasp").fit, {}, e, named)
 
     monkeypatch.setattr(stepwise, "run_stage", run_stage)
     monkeypatch.setattr(stepwise, "settled", lambda work, stage: stage)
     pair = Pair(first.candidate("grasp"), both())
     monkeypatch.setattr(stepwise, "promising_pairs", lambda work, stage: [pair])
-    bench.may_go_on = lambda: len(request.param) < 4  # type: ignore[method-assign]
+    bench.may_go_on = lambda: ends != "before"  # type: ignore[method-assign]
     joint = evidence(9 * COUNT, replace(both(), held_out_white=(*request.param, 1.0)[2]))
     bench.jointly = lambda *_: joint  # type: ignore[attr-defined]
     return find(bench, ["camera", "grasp", "tilt"], np.full(1, 0.5)), seen  # type: ignore[arg-type]
@@ -202,7 +204,7 @@ def test_a_pair_that_leaves_much_is_not_named(paired: tuple[Findings, Hints]) ->
     assert not paired[0].unjudged
 
 
-@pytest.mark.parametrize("paired", [(NEITHER, 1.0, 1.0, "spent")], indirect=True)
+@pytest.mark.parametrize("paired", [(NEITHER, 1.0, 1.0, "before"), (NEITHER, 1.0, 1.0, "later")], indirect=True)
 def test_a_pair_that_the_budget_leaves_unjudged_is_told_as_that(paired: tuple[Findings, Hints]) -> None:
     assert paired[0].verdict == "none" and paired[0].unjudged
     assert [p.names for p in paired[0].together] == [("grasp", "tilt")]
