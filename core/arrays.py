@@ -20,5 +20,5 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Products ``(N,)`` of vectors ``(N, 3)`` and ``(N, 3)``, in one call."""
-    return np.asarray(np.einsum("nx,nx->n", a, b))
+    """Products ``(...)`` of vectors ``(..., 3)`` and ``(..., 3)``, in one call."""
+    return np.asarray(np.einsum("...x,...x->...", a, b))

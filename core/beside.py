@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from .arrays import FloatArray, IntArray
+from .arrays import FloatArray, IntArray, dot
 from .motion import rotate
 from .twist import settled_twist, twist_by_ends
 
@@ -166,10 +166,10 @@ def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArr
     carried = np.empty_like(tangents)
     carried[:, 0] = _across(first, tangents[:, 0])
     sums = tangents[:, :-1] + tangents[:, 1:]
-    steep = 1.0 / np.maximum(1.0 + _dot(tangents[:, :-1], tangents[:, 1:]), 1e-9)
+    steep = 1.0 / np.maximum(1.0 + dot(tangents[:, :-1], tangents[:, 1:]), 1e-9)
     for k in range(1, tangents.shape[1]):
         axis, new = carried[:, k - 1], tangents[:, k]
-        bend = _dot(axis, new) * steep[:, k - 1]
+        bend = dot(axis, new) * steep[:, k - 1]
         carried[:, k] = _across(axis - bend[:, None] * sums[:, k - 1], new)
     beside = np.cross(tangents, carried)
     wanted = _across(last, tangents[:, -1])
@@ -202,13 +202,8 @@ def curves(points: FloatArray, fine: int = 6) -> tuple[FloatArray, IntArray]:
 
 
 def _across(vectors: FloatArray, tangents: FloatArray) -> FloatArray:
-    return _unit(vectors - _dot(vectors, tangents)[:, None] * tangents)
+    return _unit(vectors - dot(vectors, tangents)[:, None] * tangents)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.sqrt(_dot(vectors, vectors)), 1e-300)[..., None])
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Of three numbers each, in the last axis: quicker than a sum of their products."""
-    return np.asarray(np.einsum("...x,...x->...", a, b))
+    return np.asarray(vectors / np.maximum(np.sqrt(dot(vectors, vectors)), 1e-300)[..., None])

@@ -18,8 +18,8 @@ from .work import Work
 LEADING, LEADERS, TRIED = 0.2, 4, 10
 #: Pairs that are looked at closer, and evaluations of each.
 CLOSER, CLOSER_EVALUATIONS = 3, 8
-#: Responses that differ by less than this share of the largest count as one.
-ALIKE = 1e-6
+#: Responses are alike if what tells them apart is less than this share of what they have in common [squares].
+ALIKE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,12 +111,14 @@ def _promise(stage: Stage, at: Candidate, other: Candidate) -> float:
     passed. It may be of any size.
     """
     look = stage.looks[other.name]
-    ways = [at.fit.jacobian, other.fit.jacobian[:, other.base :], look.jacobian[:, look.base :]]
-    along = np.hstack([*ways, (other.fit.white - stage.plain.white)[:, None]])
+    slopes = [at.fit.jacobian, other.fit.jacobian[:, other.base :], look.jacobian[:, look.base :]]
+    along = np.hstack([*slopes, (other.fit.white - stage.plain.white)[:, None]])
     sizes = np.linalg.norm(along, axis=0)
-    basis, singular, _ = np.linalg.svd(along[:, sizes > 0.0] / sizes[sizes > 0.0], full_matrices=False)
-    told = basis[:, singular > ALIKE * singular.max(initial=0.0)].T @ at.fit.white
-    return at.rss - float(told @ told)
+    along = along[:, sizes > 0.0] / sizes[sizes > 0.0]
+    squares, ways = np.linalg.eigh(along.T @ along)  # a dozen of them: of the residuals there may be a hundred thousand
+    told = ways.T @ (along.T @ at.fit.white)
+    apart = squares > ALIKE * squares.max(initial=0.0)
+    return at.rss - float(np.sum(told[apart] ** 2 / squares[apart]))
 
 
 def _starts(work: Work, stage: Stage, lead: Candidate, other: Candidate) -> FloatArray:

@@ -225,7 +225,8 @@ def _to_be_sure(study: Study, result: dict[str, Any]) -> str:
             f"muslin next {study.path} proposes one, and how sure you would be after it."
         )
     if verdict == "none" and study.problem.recordings[study.problem.fit_on[0]].series.unit == "px":
-        return "To learn more: record points in metres; muslin unknown then estimates the missing force itself."
+        learn = "To learn more: record points in metres; muslin unknown then estimates the missing force itself."
+        return _whether_these_two(study, result) + learn
     if verdict == "none":
         best = result["candidates"][0]
         rest = f"; with muslin add {best['name']} {study.path} the rest may show" if _is_a_part(best) else ""

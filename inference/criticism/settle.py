@@ -6,8 +6,8 @@ import numpy as np
 from scipy import stats
 
 from .candidate import Candidate, best_starts
-from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, falls_short, from_there_too
-from .verdict import MARGIN, Evidence, decide, objection
+from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, from_there_too
+from .verdict import EXPLAINS, MARGIN, Evidence, decide, objection
 from .work import Work
 
 #: Points of the parameters' prior that are looked at (a power of two), how many of the best are fitted from, and
@@ -29,8 +29,8 @@ def settled(work: Work, stage: Stage) -> Stage:
     leader = min(_passing(stage.evidence) or stage.evidence.candidates, key=lambda c: c.rank)
     if stage.evidence.explained(leader) < HOPEFUL:
         return stage
-    short = not stage.effects and falls_short(stage.plain, leader)
-    until = work.before_pairs if short else float("inf")
+    paired = not stage.effects and stage.evidence.explained(leader) < EXPLAINS
+    until = work.before_pairs if paired else float("inf")
     evidence = _with(stage.evidence, _fitted_on(work, stage, leader, until))
     reached = evidence.explained(evidence.nearest)
     if evidence.left(evidence.nearest) > 0.0:

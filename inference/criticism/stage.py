@@ -102,11 +102,6 @@ def from_there_too(work: Work, effects: tuple[str, ...], plain: Polished, best: 
     return min(plain, there, key=lambda p: p.rss)
 
 
-def falls_short(plain: Polished, best: Candidate) -> bool:
-    """Does what got farthest explain too little to be named alone? Then the answer may be two."""
-    return plain.rss - best.rss < EXPLAINS * (plain.rss - plain.count)
-
-
 def _seen_only(look: Look, plain: Polished) -> Candidate:
     """A candidate that was looked at and no more."""
     fit = look.as_fit(plain, look.start, plain.white)
@@ -164,16 +159,20 @@ class _Tournament:
             found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         order = sorted(found.values(), key=lambda c: c.rank)
         most = self.plain.rss - order[0].rss
-        until = float("inf")
         for k, c in enumerate(order):
             near = self.plain.rss - c.rss > (FAR_BEHIND if k < FINALISTS else NEARLY) * most
-            if k == 1 and not self.effects and falls_short(self.plain, found[order[0].name]):
-                until = self.work.before_pairs
+            until = self.until_pairs(found[order[0].name]) if k else float("inf")
             if (k == 0 or near) and self.work.may_go_on(until):
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)
         return [found[name] for name in self.looks]
+
+    def until_pairs(self, leader: Candidate) -> float:
+        """Up to how many rollouts its rivals are refitted: one that cannot be named alone may be one of two."""
+        enough = EXPLAINS * (self.plain.rss - self.plain.count)
+        short = not self.effects and self.plain.rss - leader.rss < enough
+        return self.work.before_pairs if short else float("inf")
 
     def rescaled(self, candidate: Candidate, look: Look) -> Candidate:
         """The best of the candidate and of points where the effect is about as large as the misfit.

@@ -103,8 +103,7 @@ def test_the_pair_that_is_missing_comes_first(misfit: Stage) -> None:
 
 
 def test_what_a_candidate_did_where_it_was_found_says_which_pair_to_try(misfit: Stage) -> None:
-    """Tilt and sway explain most, but the same; and slip does nothing to the model without it, however far it is moved
-    by derivatives."""
+    """Tilt and sway explain most, but the same; derivatives at the model without it tell next to nothing of slip."""
     looks = misfit.looks | {"slip": replace(misfit.looks["slip"], jacobian=1e-3 * misfit.looks["slip"].jacobian)}
     alone = sorted(misfit.evidence.candidates, key=lambda c: c.rank)
     assert [c.name for c in alone[:2]] == ["tilt", "sway"]

@@ -9,8 +9,13 @@ import pytest
 from muslin.inference.criticism.caveats import elsewhere, invisible, numerics, rest, small, untried
 from muslin.inference.criticism.sentences import _alternatives, _in_part, _to_be_sure, _unchecked, _verdict
 
-TAKE = SimpleNamespace(series=SimpleNamespace(unit="m"))
-IN_METRES = SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": TAKE}))
+
+def study_in(unit: str) -> SimpleNamespace:
+    take = SimpleNamespace(series=SimpleNamespace(unit=unit))
+    return SimpleNamespace(path="s.toml", problem=SimpleNamespace(fit_on=("a",), recordings={"a": take}))
+
+
+IN_METRES, IN_PIXELS = study_in("m"), study_in("px")
 
 
 def result(verdict: str, ratio: float, held_out: bool = True) -> dict[str, Any]:
@@ -103,10 +108,12 @@ def test_two_effects_that_explain_more_are_told_where_none_is_named() -> None:
     ended = pair | {"judged": False}
     assert "which is more, but the budget ended before it was known whether it is these two." in told(ended)
 
-    def advice(two: dict[str, Any]) -> str:
-        return _to_be_sure(IN_METRES, none | {"together": two, "simulations": 800})  # type: ignore[arg-type]
+    def advice(two: dict[str, Any], study: SimpleNamespace = IN_METRES) -> str:
+        return _to_be_sure(study, none | {"together": two, "simulations": 800})  # type: ignore[arg-type]
 
-    assert "[diagnose] simulations = 1600" in advice(ended) and "muslin add drag,added-mass s.toml" in advice(ended)
+    for study in (IN_METRES, IN_PIXELS):
+        told_to_do = advice(ended, study)
+        assert "[diagnose] simulations = 1600" in told_to_do and "muslin add drag,added-mass s.toml" in told_to_do
     assert "simulations" not in advice(pair) + advice(ended | {"explained": 0.76})
 
 
