@@ -183,6 +183,6 @@ CASES = [
     *CABLES,
     *SLIDING,
     *(on_pybullet(case, "twist_rigidity") for case in SLIDING),
-    *(CARRIED, on_pybullet(CARRIED), IN_AIR),
+    *(CARRIED, on_pybullet(CARRIED), IN_AIR, on_pybullet(IN_AIR)),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]
