@@ -20,9 +20,11 @@ from ..core.study import build_problem, parse_config
 from ..core.study.choice import chosen
 from ..core.study.objects import grasps_of, keep_points, object_of
 from .console import command, next_step, say
+from .doubtful import doubtful_starts
 from .gridding import Grid, laid_over, seen_grid
+from .laying import Sheet, seen_sheet, starts_elsewhere
 from .output import check_output
-from .placing import check_alike, doubtful_starts, parse_markers, place_markers
+from .placing import check_alike, parse_markers, place_markers
 from .study_file import study_text
 from .study_plan import Plan
 
@@ -128,9 +130,13 @@ def new(
     extractor = _found_by(measurement, study)
     placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
     grid, more = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
-    remarks += more
     if grid is not None:
         table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
+    sheet = None if placed or mesh or extractor else _sheet(whole, measured, study, sizes)
+    if sheet is not None:
+        grid, more = None, [sheet.text()]
+        table |= {"size": sheet.size, "vertices": sheet.counts} | ({"grasps": sheet.grasps} if sheet.grasps else {})
+    remarks += more
     own = parse_config(whole, str(study)).scenario
     body = object_of(own, study.parent)
     plan = Plan(
@@ -152,7 +158,10 @@ def new(
         extractor=extractor,
         spacing="measured" if grid is not None and grid.uneven else None,
     )
-    if grid is None and plan.extractor is None:
+    if sheet is not None:
+        plan = replace(plan, frame="markers", grasps=sheet.grasps, marker_points=sheet.markers)
+        check_alike(plan, measured)
+    elif grid is None and plan.extractor is None:
         plan, more = place_markers(plan, measured, study, body, sized=bool(sizes))
         remarks += more
     elif grid is None and markers.strip():
@@ -208,6 +217,16 @@ def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool
     draft = parse_config(whole | {"scenario": table}, str(study))
     laid = laid_over(grid, build_problem(draft, measured, study.parent))
     return laid, [] if laid is None else [laid.text(sized=not other)]
+
+
+def _sheet(whole: dict[str, Any], measured: Measurement, study: Path, size: list[float]) -> Sheet | None:
+    """The sheet under the markers, if they lie on one in the air, and not where the scenario puts its object."""
+    table, recordings = whole["scenario"], [measured[name] for name in whole["study"]["fit_on"]]
+    base = preset(table["name"])
+    if len(table["size"]) != 2 or base.obstacles or (sheet := seen_sheet(base, recordings, size)) is None:
+        return None
+    draft = parse_config(whole | {"scenario": table | {"markers": [0] * len(sheet.markers)}}, str(study))
+    return sheet if starts_elsewhere(build_problem(draft, measured, study.parent)) else None
 
 
 def _other(size: list[float], usual: list[float]) -> bool:

@@ -94,13 +94,22 @@ def _scenario(plan: Plan) -> str:
 def _placed(plan: Plan) -> list[str]:
     return [
         '# The frame of the object: "gripper" (of the first gripper at its first pose), "upright" (from that',
-        '# gripper along the axes of the world) or "world" (as it stands at the start).',
-        '# frame = "gripper"',
+        '# gripper along the axes of the world), "world" (as it stands at the start) or "markers" (an own one, laid',
+        "# under the markers of the first frame of each take).",
+        f"{'' if plan.frame else '# '}frame = {_value(plan.frame or 'gripper')}",
         '# Where the measured points sit: "all" (point k on vertex k), "bound" (tied where they are in the',
         '# first frame), "surface" (anywhere: clouds), or a vertex number for each.',
-        f"markers = {_value(plan.markers)}",
+        f"{'# ' if plan.marker_points else ''}markers = {_value(plan.markers or 'all')}",
+        *(_marker_points(plan) if plan.kind == "cloth" else []),
         *(_spacing(plan) if plan.kind == "cloth" else []),
     ]
+
+
+def _marker_points(plan: Plan) -> list[str]:
+    head = "# or a place for each on a flat cloth, in the frame of the object [m]:"
+    if plan.marker_points is None:
+        return [head, "# marker_points = [[0.0, 0.0, 0.0]]"]
+    return [head, "marker_points = [", *(f"    {_value(p)}," for p in plan.marker_points), "]"]
 
 
 def _spacing(plan: Plan) -> list[str]:
@@ -143,7 +152,8 @@ def _object(plan: Plan) -> list[str]:
 
 
 def _grasps(plan: Plan) -> list[str]:
-    vertices = f"# grasps = {_value(plan.held)}  # for every gripper the vertices that it holds"
+    off = "# " if plan.grasps is None else ""
+    vertices = f"{off}grasps = {_value(plan.grasps or plan.held)}  # for every gripper the vertices that it holds"
     if plan.start:
         return [vertices]
     points = plan.grasp_points

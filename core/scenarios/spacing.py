@@ -9,6 +9,7 @@ from ..body import Body
 from ..errors import InputError
 from ..measurement import Recording, check_spatial
 from ..scenario import Scenario
+from .places import flattened, weights_at
 
 #: Markers are neighbours up to so many times the usual distance of the nearest one: on a grid, two lines away.
 _NEIGHBOURS = 2.2
@@ -17,8 +18,6 @@ _DISTANCE_SD, _PLACE_SD = 0.07, 0.5
 #: Fewer frames of a pair of markers tell nothing of their distance.
 _FEWEST = 10
 _ROUNDS = 20
-#: A sheet is flat if no vertex is further from its plane than this share of its size.
-_FLAT = 1e-6
 #: Markers that sit further than this from where they are said to are worth a word, root mean square [m].
 MATTERS = 0.005
 
@@ -47,8 +46,7 @@ def told_places(body: Body, markers: FloatArray, recordings: Sequence[Recording]
     Raises:
         InputError: not a flat sheet, points in pixels or without correspondence, or too few frames.
     """
-    plane = _plane(body)
-    flat = (body.vertices - body.vertices[0]) @ plane.T
+    flat = flattened(body, "spacing = 'measured'")
     given = markers @ flat
     for recording in recordings:
         check_spatial(recording)
@@ -69,19 +67,7 @@ def told_places(body: Body, markers: FloatArray, recordings: Sequence[Recording]
             f"seen in {_FEWEST} frames of {', '.join(r.name for r in recordings)}; leave spacing out"
         )
     places = _nearest_layout(given, pairs[told], apart[told], usual)
-    return _weights(flat, body.triangles, places)
-
-
-def _plane(body: Body) -> FloatArray:
-    """Two axes ``(2, 3)`` of the plane that a sheet lies in at rest."""
-    if body.kind == "cloth":
-        _, sizes, axes = np.linalg.svd(body.vertices - body.vertices.mean(axis=0), full_matrices=False)
-        if sizes[2] <= _FLAT * sizes[0]:
-            return np.asarray(axes[:2])
-    raise InputError(
-        "[scenario] spacing = 'measured' is for a cloth that is flat at rest, but this is "
-        f"{'a cloth of another shape' if body.kind == 'cloth' else f'a {body.kind}'}; leave it out"
-    )
+    return weights_at(flat, body.triangles, places)
 
 
 def _distances(recordings: Sequence[Recording], pairs: IntArray) -> tuple[FloatArray, IntArray]:
@@ -117,21 +103,3 @@ def _nearest_layout(given: FloatArray, pairs: IntArray, apart: FloatArray, usual
         if np.abs(step).max() < 1e-6 * usual:
             break
     return places
-
-
-def _weights(flat: FloatArray, triangles: IntArray, places: FloatArray) -> FloatArray:
-    """Weights ``(M, V)`` of the corners of the triangle that each place is in, or is beside by the least share."""
-    corners = flat[triangles]
-    across = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-    area = np.abs(np.linalg.det(across))
-    real = area > 1e-9 * area.max()  # a sliver holds no place
-    corners, across, triangles = corners[real], across[real], triangles[real]
-    inverse = np.linalg.inv(across)
-    weights = np.zeros((len(places), len(flat)))
-    for m, place in enumerate(places):
-        two = np.einsum("fij,fj->fi", inverse, place - corners[:, 0])
-        shares = np.concatenate([1.0 - two.sum(axis=1, keepdims=True), two], axis=1)
-        best = int(np.argmax(shares.min(axis=1)))
-        inside = np.maximum(shares[best], 0.0)
-        weights[m, triangles[best]] = inside / inside.sum()
-    return weights

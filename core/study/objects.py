@@ -17,6 +17,7 @@ from ..scenario import Scenario, StartShape, bound_markers, marker_weights
 from ..scenarios import preset
 from ..scenarios.grasps import ASK, grasps_at
 from ..scenarios.measured import measured_start
+from ..scenarios.places import marker_points
 from ..scenarios.starts import GivenShape
 from ..surface_samples import surface_weights
 from .scenario_table import ScenarioTable
@@ -110,11 +111,14 @@ def build_scenario(
         return measured_start(plain, recording, beside)
     if not marked:
         return plain
+    if table.marker_points is not None:
+        weights = marker_points(given, np.array(table.marker_points))
+        return replace(plain, markers=_as_many(weights, recording, "marker_points", "points"))
     return replace(plain, markers=_markers(table.markers, plain, recording), sampled=table.markers == "surface")
 
 
 def _in_gripper_frame(body: Body, frame: str, motion: Motion, start: float) -> Body:
-    if frame == "gripper":
+    if frame in ("gripper", "markers"):
         return body
     pose = motion.at(np.array([start]))[0, 0] if motion.grippers else IDENTITY_POSE
     away = body.vertices - pose[:3] if frame == "world" else body.vertices
@@ -189,13 +193,7 @@ def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Reco
         except InputError as error:
             raise InputError(f"recording {recording.name!r}: {error}") from error
     if isinstance(choice, list):
-        weights = marker_weights(count, np.array(choice, np.int64))
-        if recording.series.correspondence and len(weights) != points.shape[1]:
-            raise InputError(
-                f"[scenario.markers] names {len(weights)} vertices, "
-                f"but recording {recording.name!r} has {points.shape[1]} points"
-            )
-        return weights
+        return _as_many(marker_weights(count, np.array(choice, np.int64)), recording, "markers", "vertices")
     if recording.series.correspondence and points.shape[1] != count:
         raise InputError(
             f"recording {recording.name!r} has {points.shape[1]} points, the mesh {count} vertices; say where the "
@@ -203,3 +201,13 @@ def _markers(choice: list[int] | str | None, scenario: Scenario, recording: Reco
             "it is in the first frame, or import without --correspondence"
         )
     return np.eye(count)
+
+
+def _as_many(weights: FloatArray, recording: Recording, key: str, what: str) -> FloatArray:
+    """The weights, if they are as many as the points that are followed."""
+    count = recording.series.points.shape[1]
+    if recording.series.correspondence and len(weights) != count:
+        raise InputError(
+            f"[scenario.{key}] names {len(weights)} {what}, but recording {recording.name!r} has {count} points"
+        )
+    return weights

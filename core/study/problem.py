@@ -22,6 +22,7 @@ from ..sanity import SanityCheck
 from ..scenario import STANDARD_GRAVITY, Scenario
 from ..scenarios import preset
 from ..scenarios.kept import told_bend
+from ..scenarios.laid import laid_under
 from ..scenarios.measured import with_earlier
 from ..scenarios.spacing import told_places
 from ..scenarios.standoffs import told_beside
@@ -181,6 +182,8 @@ def build_problem(config: StudyConfig, measurement: Measurement, folder: Path = 
         first = scenarios[fit_on[0]]
         places = told_places(first.body, first.markers, [recordings[n] for n in fit_on])
         scenarios = {n: replace(s, markers=places) for n, s in scenarios.items()}
+    if config.scenario.frame == "markers":
+        scenarios = {n: laid_under(s, recordings[n]) for n, s in scenarios.items()}
     kind = scenarios[fit_on[0]].body.kind
     if config.scenario.start == "measured":
         kept = told_bend([scenarios[n] for n in fit_on], [recordings[n] for n in fit_on])

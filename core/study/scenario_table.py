@@ -71,8 +71,10 @@ class ScenarioTable(StrictTable):
     ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says
     in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
     first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
-    as it stands in the world at the start. ``start = "measured"`` lets a rope start through the markers of the first
-    frame, at once, and says where they are on it: its length, and so its mass, follow from each take. With
+    as it stands in the world at the start; ``"markers"``: in axes of its own, laid under the markers of the first frame
+    of each take, see :func:`~muslin.core.scenarios.laid.laid_under`. ``marker_points`` are where the markers sit on a
+    flat cloth, in the same axes as ``grasp_points``. ``start = "measured"`` lets a rope start through the markers of
+    the first frame, at once, and says where they are on it: its length, and so its mass, follow from each take. With
     ``markers = "beside"`` these stand beside the axis of the rope, see
     :func:`~muslin.core.scenarios.standoffs.told_standoffs`. With ``spacing = "measured"`` the markers of a flat cloth
     sit as far apart as the recordings that are fitted show, near where ``markers`` says, see
@@ -86,12 +88,13 @@ class ScenarioTable(StrictTable):
     mesh_scale: float = Field(default=1.0, gt=0)
     mesh_up: Literal["x", "y", "z"] = "z"
     straight_rest: bool = False
-    frame: Literal["gripper", "upright", "world"] = "gripper"
+    frame: Literal["gripper", "upright", "world", "markers"] = "gripper"
     grasps: list[list[int]] | None = None
     grasp_points: list[Point | list[Point]] | None = None
     grasp_radius: float = Field(default=0.0, ge=0)
     start: Literal["measured"] | None = None
     markers: list[int] | Literal["all", "bound", "surface", "beside"] | None = None
+    marker_points: list[Point] | None = None
     spacing: Literal["measured"] | None = None
     points: list[int] | None = None
     settle: float | None = Field(default=None, ge=0)
@@ -121,6 +124,8 @@ class ScenarioTable(StrictTable):
             raise ValueError("size does not go with a mesh, which has one of its own; use mesh_scale")
         if self.grasps is not None and self.grasp_points is not None:
             raise ValueError("grasps and grasp_points both say what is held; keep one of them")
+        if self.markers is not None and self.marker_points is not None:
+            raise ValueError("markers and marker_points both say where the markers sit; keep one of them")
         if self.start is not None:
             self._only_measured()
         elif self.markers == "beside":
@@ -130,6 +135,11 @@ class ScenarioTable(StrictTable):
                 f"spacing = 'measured' moves markers that sit on vertices, not markers = {self.markers!r}; keep one of "
                 "the two"
             )
+        if self.frame == "markers" and self.markers in ("bound", "surface"):
+            raise ValueError(
+                f"frame = 'markers' lays the object under markers that sit on its vertices, not under markers = "
+                f"{self.markers!r}; keep one of the two"
+            )
         if self.grasp_points is None and "grasp_radius" in self.model_fields_set:
             raise ValueError("grasp_radius goes with grasp_points, which are missing")
         return self
@@ -138,6 +148,7 @@ class ScenarioTable(StrictTable):
         """What the first frame tells is not told here too: it would be ignored."""
         told = [k for k in ("mesh", "size") if getattr(self, k) is not None]
         told += ["markers"] if self.markers not in (None, "beside") else []
+        told += ["marker_points"] if self.marker_points is not None else []
         told += ["spacing"] if self.spacing is not None else []
         told += ["frame"] if self.frame != "gripper" else []
         if told:
