@@ -7,6 +7,9 @@ from ..caveats import ELSEWHERE
 from .adequacy import Adequacy
 from .excess import Group
 
+#: A model is further off than none only if it is so many times the noise off, too.
+ASTRAY = 2.0
+
 
 @dataclass(frozen=True)
 class Row:
@@ -92,6 +95,19 @@ class Comparison:
             "then, muslin diagnose asks what it lacks."
         )
 
+    @property
+    def astray(self) -> str:
+        """That the model is further off than none, which no material nor effect mends; "" where it is not."""
+        worse = [r.recording for r in self.rows if r.rmse > max(r.baseline, ASTRAY * r.noise)]
+        if self.adequate or 2 * len(worse) <= len(self.rows):
+            return ""
+        return (
+            f"On {len(worse)} of {len(self.rows)} recordings ({', '.join(worse[:3])}{' …' if len(worse) > 3 else ''}) "
+            "the model is further off than the first measured shape carried along by the gripper (baseline). That is "
+            "seldom for want of physics: look first at where the object starts, at its size, and at what each gripper "
+            "holds ([scenario] in the study file; muslin report shows it)."
+        )
+
     def text(self) -> str:
         """A table and a few sentences for people."""
         unit, factor = ("mm", 1e3) if self.rows[0].unit == "m" else (self.rows[0].unit, 1.0)
@@ -105,7 +121,7 @@ class Comparison:
                 for v, w in ((r.rmse, 8), (r.noise, 8), (r.scatter, 8), (r.baseline, 9), (r.default, 9))
             )
             lines.append(f"{r.recording:<{wide}} {r.role:<9}{cells}  {r.worst_time:.2f} s, point {r.worst_point}")
-        verdict = " ".join(s for s in (self.adequacy.text(), self.elsewhere) if s)
+        verdict = " ".join(s for s in (self.adequacy.text(), self.elsewhere, self.astray) if s)
         return "\n".join([*lines, *(s for s in (self.in_pieces, self.where, self.sets, verdict) if s)])
 
     def to_json(self) -> dict[str, Any]:
@@ -117,6 +133,7 @@ class Comparison:
             "limit": self.adequacy.limit,
             "signs": [asdict(s) for s in self.adequacy.signs],
             "elsewhere": self.elsewhere,
+            "astray": self.astray,
             "where": self.where,
             "sets": self.sets,
             "in_pieces": self.in_pieces,
