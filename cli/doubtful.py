@@ -2,18 +2,16 @@
 
 import numpy as np
 
-from ..core.arrays import FloatArray
 from ..core.body import Body
 from ..core.measurement import Recording
 from ..core.pose_span import uncovered
 from ..core.scenario import Scenario
 from ..core.study import Problem
+from .rope_start import on_a_line
 
 #: At the start points are no further from where the model puts them than this share of the object's size; as the model
 #: does not know how a real object hangs they are some hundredths of it away.
 _ELSEWHERE = 0.4
-#: So many points at least whose spread beside their line is less than this share of that along it are on a line.
-_FEWEST_OF_A_LINE, _NARROW = 4, 0.02
 #: A point further than this share of the object's size from it is probably in another frame.
 _FAR = 0.25
 
@@ -50,7 +48,7 @@ def doubtful_starts(problem: Problem) -> list[str]:
         remarks += _out_of_hand(recording, scenario, size)
         if scenario.body.kind == "solid":
             remarks += _beside(recording, scenario)
-        if scenario.body.kind == "cloth" and _on_a_line(recording.series.points[0]):
+        if scenario.body.kind == "cloth" and on_a_line(recording.series.points[0]):
             remarks.append(
                 f"warning: all points of {name} start on one line; if they are those of a rope, give its length with "
                 "--size LENGTH"
@@ -100,15 +98,6 @@ def _beside(recording: Recording, scenario: Scenario) -> list[str]:
         f"warning: {recording.name}: point {int(away.argmax())} is {away.max():.2g} m from the object at the start; "
         "leave it out with --points if it is not on the object, or check the size, --up and the unit"
     ]
-
-
-def _on_a_line(points: FloatArray) -> bool:
-    """Whether ``points (P, 3)``, four or more, lie on one line."""
-    seen = points[np.isfinite(points).all(axis=1)]
-    if len(seen) < _FEWEST_OF_A_LINE or points.shape[1] != 3:
-        return False
-    sizes = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
-    return bool(sizes[1] < _NARROW * sizes[0])
 
 
 def _parts(body: Body) -> int:

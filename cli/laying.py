@@ -41,6 +41,7 @@ class Sheet:
         markers: where they are on it, in its own frame ``[x, y, z]`` [m].
         grasps: for every gripper the vertices that it holds; None: those of the scenario.
         known: the size was given.
+        why: it is laid here, as far as it is worth a word.
     """
 
     size: list[float]
@@ -48,6 +49,7 @@ class Sheet:
     markers: list[list[float]]
     grasps: list[list[int]] | None
     known: bool
+    why: str = ""
 
     def text(self) -> str:
         """What was found, for a person."""
@@ -56,7 +58,7 @@ class Sheet:
         size = f"{self.size[0]:g} x {self.size[1]:g} m{known}"
         return (
             f"the {len(self.markers)} points are on a flat sheet of {size}, which starts where they are in the first "
-            f"frame of each take{held}"
+            f"frame of each take{held}{'; ' if self.why else ''}{self.why}"
         )
 
 
@@ -106,18 +108,21 @@ def seen_sheet(base: Preset, recordings: Sequence[Recording], size: Sequence[flo
     return min(laid, key=lambda sheet: sheet[0])[1] if laid else None
 
 
-def starts_elsewhere(problem: Problem) -> bool:
-    """Whether the first frames do not go with where a scenario puts its object, or with how many grippers hold it."""
+def why_elsewhere(problem: Problem) -> str | None:
+    """Why the first frames do not go with how a scenario holds its object, or where it puts it; None if they do."""
     for name in problem.fit_on:
         scenario, recording = problem.scenarios[name], problem.recordings[name]
         if recording.gripper is not None and recording.gripper.grippers > len(scenario.grasps) > 0:
-            return True
+            return ""  # is said anyway
         vertices = scenario.start_vertices()
         size = float(np.ptp(vertices, axis=0).max())
         away = np.linalg.norm(recording.series.points[0][:, None] - vertices[None], axis=2).min(axis=1)
         if (away > _ELSEWHERE * size).any():
-            return True
-    return False
+            return (
+                f"{scenario.name!r} alone would start up to {np.nanmax(away):.2g} m from them: if that is unexpected, "
+                "check --up, the unit and the gripper poses (x y z, then the quaternion w x y z)"
+            )
+    return None
 
 
 def _flattened(recording: Recording, size: Sequence[float]) -> _Seen | None:

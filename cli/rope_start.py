@@ -1,10 +1,13 @@
 """Whether takes of a rope show it from one gripper to the other, so that they can start through their markers."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..core.arrays import FloatArray
 from ..core.measurement import Recording
 from ..core.registry import REGISTRY
+from ..core.scenarios.laid import before_it_moves
 from .study_plan import Plan
 
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
@@ -13,6 +16,10 @@ _FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
 #: A rope that sags by this share of its length sags down, in the mean over its takes, to so many degrees: one that
 #: keeps a bend, or is swung, sags aside by far less.
 _SAGS, _ASIDE = 0.05, 60.0
+#: So many points at least whose spread beside their line is less than this share of that along it are on a line.
+_FEWEST_OF_A_LINE, _NARROW = 4, 0.02
+#: A gripper holds the end of a line if it is no further beside it than this share of its length, nor from there inward.
+_AT_AN_END = 0.05
 
 
 def may_start_measured(plan: Plan) -> bool:
@@ -80,3 +87,40 @@ def _shortest_tree(points: FloatArray) -> float:
         left[nearest] = False
         away = np.minimum(away, apart[nearest])
     return float(total)
+
+
+def hanging_length(recordings: Sequence[Recording]) -> float | None:
+    """Length [m] of a rope, if markers start on one line in every take and a gripper holds an end of it; else None.
+
+    From the gripper to the last marker, in the median over takes.
+    """
+    lengths = [_from_hand_to_tip(recording) for recording in recordings]
+    told = [length for length in lengths if length is not None]
+    return round(float(np.median(told)), 3) if len(told) == len(lengths) else None
+
+
+def _from_hand_to_tip(recording: Recording) -> float | None:
+    series = recording.series
+    if not series.correspondence or series.unit != "m" or recording.gripper is None:
+        return None
+    first, _ = before_it_moves(recording)
+    if not on_a_line(first):
+        return None
+    seen = first[np.isfinite(first).all(axis=1)]
+    hand = recording.gripper.at(series.time[:1])[0, 0, :3]
+    along = np.linalg.svd(seen - seen.mean(axis=0), full_matrices=False)[2][0]
+    places, held = (seen - hand) @ along, seen.mean(axis=0) - hand
+    length = float(np.abs(places).max())
+    beside = float(np.linalg.norm(held - (held @ along) * along))
+    # on which side the rope is
+    inward = -float((places * np.sign(np.median(places))).min())
+    return length if max(beside, inward) <= _AT_AN_END * length else None
+
+
+def on_a_line(points: FloatArray) -> bool:
+    """Whether ``points (P, 3)``, four or more, lie on one line."""
+    seen = points[np.isfinite(points).all(axis=1)]
+    if len(seen) < _FEWEST_OF_A_LINE or points.shape[1] != 3:
+        return False
+    sizes = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
+    return bool(sizes[1] < _NARROW * sizes[0])

@@ -22,9 +22,10 @@ from ..core.study.objects import grasps_of, keep_points, object_of
 from .console import command, next_step, say
 from .doubtful import doubtful_starts
 from .gridding import Grid, laid_over, seen_grid
-from .laying import Sheet, seen_sheet, starts_elsewhere
+from .laying import Sheet, seen_sheet, why_elsewhere
 from .output import check_output
 from .placing import check_alike, parse_markers, place_markers
+from .rope_start import hanging_length
 from .study_file import study_text
 from .study_plan import Plan
 
@@ -117,6 +118,15 @@ def new(
         raise InputError("--size does not go with --mesh, which has a size of its own; use --mesh-scale")
     if not mesh and mesh_scale != 1.0:
         raise InputError("--mesh-scale goes with --mesh; for a built-in object give --size")
+    placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
+    if not (sizes or mesh or placed) and base.kind == "cloth" and "rope" in base.kinds:
+        length = hanging_length([measured[name] for name in fitted])
+        if length is not None:
+            sizes = [length]
+            remarks.append(
+                f"all points start on one line that begins in the gripper, as those of a rope do, {length:g} m from "
+                "there to the last of them (--size LENGTH if it is longer)"
+            )
     table: dict[str, Any] = {"name": scenario}
     if mesh:
         table |= {"mesh": _from(study, mesh), "mesh_scale": mesh_scale}
@@ -128,7 +138,6 @@ def new(
         table["grasp_points"] = _points(grasp_points)
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
-    placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
     grid, more = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
     if grid is not None:
         table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
@@ -226,7 +235,8 @@ def _sheet(whole: dict[str, Any], measured: Measurement, study: Path, size: list
     if len(table["size"]) != 2 or base.obstacles or (sheet := seen_sheet(base, recordings, size)) is None:
         return None
     draft = parse_config(whole | {"scenario": table | {"markers": [0] * len(sheet.markers)}}, str(study))
-    return sheet if starts_elsewhere(build_problem(draft, measured, study.parent)) else None
+    why = why_elsewhere(build_problem(draft, measured, study.parent))
+    return None if why is None else replace(sheet, why=why)
 
 
 def _other(size: list[float], usual: list[float]) -> bool:

@@ -4,13 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from muslin.cli.main import run
+from muslin.cli.rope_start import hanging_length
 from muslin.core.measurement import Measurement, Recording
 from muslin.core.measurement_store import save_measurement
 from muslin.core.motion import Motion, rotate
 from muslin.core.scenarios import preset
 from muslin.core.series import PointSeries
+from muslin.core.study import read_config
 
 AWAY, LINE = "away from where the model puts the object", "all points of one start on one line"
 #: A gripper that is turned by 60 degrees about x as it begins.
@@ -63,11 +67,38 @@ def test_a_size_in_millimetres_puts_all_markers_on_one_vertex(
     assert "all 11 points are nearest to one vertex of the object, which is 1e+03 m large" in refused
     assert "within 1 m; give the size of the object in metres with --size" in refused
     assert not (tmp_path / "s.toml").exists()
-    assert f"{LINE}; if they are those of a rope, give its length" in told(
-        tmp_path, capsys, hanging, upright, "--scenario", "swing"
-    )
-    (tmp_path / "s.toml").unlink()
     assert LINE not in told(tmp_path, capsys, hanging, upright, "--scenario", "swing", "--size", "1")
+
+
+@pytest.mark.parametrize(("aside", "rope"), [(0.0, True), (0.2, False)])
+def test_points_on_a_line_are_those_of_a_rope_if_it_begins_in_the_gripper(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], aside: float, rope: bool
+) -> None:
+    upright = np.array([1.0, 0.0, 0.0, 0.0])
+    hanging = np.linspace([aside, 0.0, 0.9], [aside, 0.0, 0.2], 8)
+    text = told(tmp_path, capsys, hanging, upright, "--scenario", "swing")
+    assert (f"{LINE}; if they are those of a rope, give its length" in text) != rope
+    assert ("as those of a rope do, 0.8 m from there to the last of them" in " ".join(text.split())) == rope
+    assert read_config(tmp_path / "s.toml").scenario.size == ([0.8] if rope else [0.3, 0.3])
+
+
+@given(st.floats(0.3, 3.0), st.integers(4, 20), st.floats(-3, 3), st.floats(-1.2, 1.2), st.integers(0, 9))
+def test_a_rope_is_as_long_as_it_reaches_from_its_gripper(
+    length: float, count: int, yaw: float, tilt: float, seed: int
+) -> None:
+    """Whatever way it lies and however its markers are numbered; not where the gripper is in its middle."""
+    rng = np.random.default_rng(seed)
+    way = np.array([np.cos(yaw) * np.cos(tilt), np.sin(yaw) * np.cos(tilt), np.sin(tilt)])
+    along = rng.permutation(np.linspace(0.0, length, count + 1)[1:])
+    points = np.tile([0.3, -0.2, 1.0] + along[:, None] * way, (5, 1, 1))
+    times = np.linspace(0.0, 0.2, 5)
+
+    def take(at: float) -> Recording:
+        hand = np.array([0.3, -0.2, 1.0]) + at * way
+        return Recording("one", PointSeries(times, points), Motion.from_positions(times, np.tile(hand, (5, 1, 1))))
+
+    assert hanging_length([take(0.0), take(0.0)]) == pytest.approx(length, abs=1e-3)
+    assert hanging_length([take(0.0), take(0.5 * length)]) is None
 
 
 def test_a_marker_that_is_not_on_a_solid_is_remarked_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
