@@ -24,6 +24,7 @@ from .doubtful import doubtful_starts
 from .gridding import Grid, laid_over, seen_grid
 from .laying import Sheet, seen_sheet, why_elsewhere
 from .output import check_output
+from .pacing import paced
 from .placing import check_alike, parse_markers, place_markers
 from .rope_start import hanging_length
 from .study_file import study_text
@@ -179,6 +180,8 @@ def new(
         plan = replace(plan, markers="all")
     else:
         check_alike(plan, measured)
+    plan, more = paced(plan, [keep_points(measured[name], compared) for name in fitted])
+    remarks += more
     text = study_text(plan)
     problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
     remarks += doubtful_starts(problem)

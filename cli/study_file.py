@@ -182,7 +182,7 @@ def _inline(tables: list[dict[str, Any]]) -> str:
 
 def _plugins(plan: Plan) -> str:
     own = {}
-    if usual := REGISTRY.get("simulator", plan.simulator).usual_steps.get(plan.kind):
+    if usual := plan.time_step or REGISTRY.get("simulator", plan.simulator).usual_steps.get(plan.kind):
         own = {"time_step": usual}
     options = "".join(f"{line}\n" for line in _options("simulator", plan.simulator, own))
     default = EstimatorTable(name=plan.estimator)

@@ -28,6 +28,7 @@ class Plan:
         extractor: name and options of what found the points in pictures, or None where they were measured.
         start: ``"measured"`` where a rope starts through its markers, which then tell its length and where they sit.
         spacing: ``"measured"`` where the markers sit as far apart as they are seen, not where their vertices are.
+        time_step: of the simulator [s], None for the usual one.
         frame: in which axes the object is given, None for the usual ones.
         grasps: for every gripper the vertices that it holds, None for those that the scenario or ``grasp_points`` say.
         marker_points: where the markers sit on a flat sheet [m], None for where ``markers`` says.
@@ -53,6 +54,7 @@ class Plan:
     extractor: dict[str, Any] | None = None
     start: str | None = None
     spacing: str | None = None
+    time_step: float | None = None
     frame: str | None = None
     grasps: list[list[int]] | None = None
     marker_points: list[list[float]] | None = None

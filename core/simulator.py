@@ -108,6 +108,9 @@ class Simulator(ABC):
     capabilities: ClassVar[frozenset[str]] = frozenset()
     #: ``time_step`` that a new study of an object of a kind gets, where what it is by default is too long [s].
     usual_steps: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    #: How far parts of an object may turn in a step before the step shows, where that shortens it [rad]; None: it does
+    #: not.
+    most_turn: ClassVar[float | None] = None
 
     @abstractmethod
     def open(self, scene: Scene) -> World:
