@@ -64,7 +64,7 @@ def turning_rate(recording: Recording) -> float:
     between = 0.5 * (points[over:] + points[:-over])
     i, j = pairs.T
     apart = np.linalg.norm(between[:, i] - between[:, j], axis=2)
-    rates = np.linalg.norm(velocity[:, i] - velocity[:, j], axis=2) / np.maximum(apart, 1e-9)
+    rates = np.linalg.norm(velocity[:, i] - velocity[:, j], axis=2)[apart > 0.0] / apart[apart > 0.0]
     rates = rates[np.isfinite(rates)]
     if not len(rates):
         return 0.0
@@ -83,6 +83,6 @@ def _neighbours(points: FloatArray) -> IntArray:
     usual = np.where(seen, np.nanmedian(np.where(seen, away, 0.0), axis=0), np.inf)
     np.fill_diagonal(usual, np.inf)
     size = np.max(usual, where=np.isfinite(usual), initial=0.0)
-    usual = np.where(usual < _NEAR * size, np.inf, usual)
+    usual = np.where((usual < _NEAR * size) | (usual == 0.0), np.inf, usual)
     nearest = [(i, j) for i, row in enumerate(usual) for j in np.argsort(row)[:_NEIGHBOURS] if row[j] < np.inf]
     return np.array(nearest, np.int64).reshape(-1, 2)

@@ -51,6 +51,7 @@ def test_where_it_is_not_known_nothing_turns() -> None:
         PointSeries(series.time, series.points[..., :2], unit="px"),
         PointSeries(series.time[:2], series.points[:2]),
         PointSeries(series.time, series.points[:, :1]),
+        PointSeries(series.time, np.zeros_like(series.points)),
         PointSeries(series.time, np.where(np.arange(25)[:, None] < 24, np.nan, series.points)),
     ):
         assert turning_rate(Recording("one", other)) == 0.0
