@@ -12,7 +12,7 @@ from queue import SimpleQueue
 from types import TracebackType
 from typing import TypeAlias
 
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from ..errors import InputError, MuslinError
 from .problem import Problem
@@ -59,7 +59,7 @@ class SimulationPool:
         self._busy: set[Worker] = set()
         self._file: str | None = None
         self._accepted = False  # the study has been simulated, well or not, at least once
-        self._prepared = False  # in this process
+        self._here: ThreadpoolController | None = None  # of this process, once it is prepared; dear to look up
         self._closed = False
 
     def __enter__(self) -> "SimulationPool":
@@ -122,12 +122,13 @@ class SimulationPool:
                 warnings.warn(f"{_HERE} ({error})", stacklevel=4)
                 self.workers = 0
         if self._threads is None:
-            if tasks and not self._prepared:
-                with threadpool_limits(1):
+            if tasks and self._here is None:
+                with ThreadpoolController().limit(limits=1):
                     self.problem.prepare()
-                self._prepared = True
+                self._here = ThreadpoolController()
             for task in tasks:
-                with threadpool_limits(1):  # not across the yield: what the caller does is not ours to limit
+                assert self._here is not None
+                with self._here.limit(limits=1):  # not across the yield: what the caller does is not ours to limit
                     outcome = simulate(self.problem, task)
                 yield outcome
             return
