@@ -33,8 +33,9 @@ $(VENV)/.ready-bench: $(VENV)/.ready
 demo: $(VENV)/.ready
 	@$(BIN)/python examples/demo.py
 
+# two processes; more threads of linear algebra would be in one another's way
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
