@@ -89,6 +89,17 @@ def _shortest_tree(points: FloatArray) -> float:
     return float(total)
 
 
+def rope_sizes(recordings: Sequence[Recording]) -> tuple[list[float], list[str]]:
+    """The length of a rope, as ``--size`` would give it, where markers show one; a remark."""
+    length = hanging_length(recordings)
+    if length is None:
+        return [], []
+    return [length], [
+        f"all points start on one line that begins in the gripper, as those of a rope do, {length:g} m from there to "
+        "the last of them (--size LENGTH if it is longer)"
+    ]
+
+
 def hanging_length(recordings: Sequence[Recording]) -> float | None:
     """Length [m] of a rope, if markers start on one line in every take and a gripper holds an end of it; else None.
 

@@ -21,17 +21,14 @@ from ..core.study.choice import chosen
 from ..core.study.objects import grasps_of, keep_points, object_of
 from .console import command, next_step, say
 from .doubtful import doubtful_starts
-from .gridding import Grid, laid_over, seen_grid
-from .laying import Sheet, seen_sheet, why_elsewhere
 from .output import check_output
 from .pacing import paced
 from .placing import check_alike, parse_markers, place_markers
-from .rope_start import hanging_length
+from .rope_start import rope_sizes
+from .shown import Shown, shown_by_markers
 from .study_file import study_text
 from .study_plan import Plan
 
-#: A cloth that is larger or smaller than this share of another is not of its size.
-_OTHER = 0.1
 Number = TypeVar("Number", int, float)
 
 
@@ -121,13 +118,8 @@ def new(
         raise InputError("--mesh-scale goes with --mesh; for a built-in object give --size")
     placed = any(text.strip() for text in (vertices, grasp_points, points, markers))
     if not (sizes or mesh or placed) and base.kind == "cloth" and "rope" in base.kinds:
-        length = hanging_length([measured[name] for name in fitted])
-        if length is not None:
-            sizes = [length]
-            remarks.append(
-                f"all points start on one line that begins in the gripper, as those of a rope do, {length:g} m from "
-                "there to the last of them (--size LENGTH if it is longer)"
-            )
+        sizes, more = rope_sizes([measured[name] for name in fitted])
+        remarks += more
     table: dict[str, Any] = {"name": scenario}
     if mesh:
         table |= {"mesh": _from(study, mesh), "mesh_scale": mesh_scale}
@@ -139,14 +131,10 @@ def new(
         table["grasp_points"] = _points(grasp_points)
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
-    grid, more = (None, []) if placed or mesh or extractor else _grid(whole, measured, study, bool(sizes))
-    if grid is not None:
-        table |= {"vertices": grid.counts} | ({"size": grid.size} if _other(grid.size, table["size"]) else {})
-    sheet = None if placed or mesh or extractor else _sheet(whole, measured, study, sizes)
-    if sheet is not None:
-        grid, more = None, [sheet.text()]
-        table |= {"size": sheet.size, "vertices": sheet.counts} | ({"grasps": sheet.grasps} if sheet.grasps else {})
-    remarks += more
+    shown = Shown() if placed or mesh or extractor else shown_by_markers(whole, measured, study, sizes)
+    grid, sheet = shown.grid, shown.sheet
+    table |= shown.table
+    remarks += shown.remarks
     own = parse_config(whole, str(study)).scenario
     body = object_of(own, study.parent)
     plan = Plan(
@@ -213,38 +201,6 @@ def _takes(
     others = f"; the other {rest} stay in the measurement, untouched" if rest else ""
     told = f"chosen of {total} takes, evenly from the slowest start to the fastest{others}"
     return fitted, held, [f"{told}; --fit-on and --hold-out choose otherwise"]
-
-
-def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool) -> tuple[Grid | None, list[str]]:
-    """The grid that the points are, if they lie as its vertices do and it is as large as the person says; remarks."""
-    size = whole["scenario"]["size"]
-    if len(size) != 2 or (grid := seen_grid([measured[name] for name in whole["study"]["fit_on"]])) is None:
-        return None, []
-    other = _other(grid.size, size)
-    if sized and other:
-        seems = f"{grid.size[0]:g} x {grid.size[1]:g} m"
-        return None, [f"warning: by how far apart the points are, they are a grid over {seems}; check --size"]
-    table = whole["scenario"] | {"vertices": grid.counts, "markers": grid.markers}
-    table |= {"size": grid.size} if other else {}
-    draft = parse_config(whole | {"scenario": table}, str(study))
-    laid = laid_over(grid, build_problem(draft, measured, study.parent))
-    return laid, [] if laid is None else [laid.text(sized=not other)]
-
-
-def _sheet(whole: dict[str, Any], measured: Measurement, study: Path, size: list[float]) -> Sheet | None:
-    """The sheet under the markers, if they lie on one in the air, and not where the scenario puts its object."""
-    table, recordings = whole["scenario"], [measured[name] for name in whole["study"]["fit_on"]]
-    base = preset(table["name"])
-    if len(table["size"]) != 2 or base.obstacles or (sheet := seen_sheet(base, recordings, size)) is None:
-        return None
-    draft = parse_config(whole | {"scenario": table | {"markers": [0] * len(sheet.markers)}}, str(study))
-    why = why_elsewhere(build_problem(draft, measured, study.parent))
-    return None if why is None else replace(sheet, why=why)
-
-
-def _other(size: list[float], usual: list[float]) -> bool:
-    """Whether a cloth that seems ``size`` [m] large is not one of the ``usual`` size."""
-    return any(abs(a - b) > _OTHER * b for a, b in zip(size, usual, strict=True))
 
 
 def _from(study: Path, file: Path) -> str:
