@@ -18,6 +18,8 @@ _OVER, _NEAR, _NEIGHBOURS = 0.03, 0.15, 3
 #: Of how fast parts turn this percentile counts; of noise so many standard deviations are at it, in space and in one
 #: direction.
 _MOST, _NOISE, _ALONG = 99.0, 3.4, 2.3
+#: Of more markers so many tell it, and of more frames so many who is next to whom.
+_MARKERS, _FRAMES = 300, 30
 #: The usual step is halved so often at most.
 _HALVINGS = 2
 
@@ -52,7 +54,7 @@ def halved(usual: float, most_turn: float, recordings: Sequence[Recording]) -> t
 def turning_rate(recording: Recording) -> float:
     """How fast parts of an object turn [rad/s], by how neighbouring markers move past one another; 0 if not known."""
     series = recording.series
-    points, time = series.points, series.time
+    time, points = series.time, series.points[:, :: -(-series.points.shape[1] // _MARKERS)]
     if not series.correspondence or series.unit != "m" or len(time) < 3:
         return 0.0
     over = max(1, round(_OVER / float(np.median(np.diff(time)))))
@@ -78,7 +80,8 @@ def turning_rate(recording: Recording) -> float:
 
 def _neighbours(points: FloatArray) -> IntArray:
     """Pairs of markers ``(N, 2)`` that are next to one another, by their usual distances."""
-    away = np.linalg.norm(points[:, :, None] - points[:, None], axis=3)
+    frames = points[:: -(-len(points) // _FRAMES)]
+    away = np.linalg.norm(frames[:, :, None] - frames[:, None], axis=3)
     seen = np.isfinite(away).any(axis=0)
     usual = np.where(seen, np.nanmedian(np.where(seen, away, 0.0), axis=0), np.inf)
     np.fill_diagonal(usual, np.inf)

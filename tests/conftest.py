@@ -1,8 +1,13 @@
-"""In which order tests run."""
+"""In which order tests run, and that they may take their time."""
 
 from itertools import chain
 
 import pytest
+from hypothesis import settings
+
+# what is slow on a machine with other work is no fault
+settings.register_profile("muslin", deadline=None)
+settings.load_profile("muslin")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

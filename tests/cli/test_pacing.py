@@ -17,10 +17,10 @@ from muslin.core.scenarios import preset
 from muslin.core.series import PointSeries
 
 
-def turning(rate: float, noise: float = 0.0, frequency: float = 100.0, drift: float = 3.0, seed: int = 0) -> Recording:
+def turning(rate: float, noise: float = 0.0, drift: float = 3.0, seed: int = 0, side: int = 5) -> Recording:
     """The 25 markers of a sheet of 0.3 m that turns about x at ``rate`` [rad/s] as it is carried along."""
-    places = preset("fling").body((0.3, 0.3), (5, 5)).vertices
-    time = np.arange(0.0, 1.0, 1.0 / frequency)
+    places = preset("fling").body((0.3, 0.3), (side, side)).vertices
+    time = np.arange(0.0, 1.0, 0.01)
     sin, cos = np.sin(rate * time)[:, None], np.cos(rate * time)[:, None]
     x, z = places[:, 0], places[:, 2]
     points = np.stack([x + drift * time[:, None], -z * sin, z * cos], axis=2)
@@ -41,6 +41,10 @@ def test_what_turns_as_a_whole_turns_at_its_rate(rate: float, drift: float) -> N
 def test_noise_is_not_taken_for_turning(noise: float) -> None:
     assert turning_rate(turning(0.0, noise)) < 6.0
     assert turning_rate(turning(20.0, noise)) == pytest.approx(21.0, abs=2.5)
+
+
+def test_many_markers_tell_it_as_few_do() -> None:
+    assert turning_rate(turning(20.0, side=60)) == pytest.approx(turning_rate(turning(20.0)), rel=0.02)
 
 
 def test_where_it_is_not_known_nothing_turns() -> None:

@@ -94,7 +94,7 @@ def test_a_parameter_is_told_as_well_as_is_said() -> None:
     assert np.sqrt(found.information) < 0.05  # as if each were off by itself it would be twenty times too sure
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(0.02, 0.2), st.floats(0.0, 0.95))
 def test_a_smooth_field_has_the_reach_and_the_colour_that_it_is_asked_for(reach: float, ar1: float) -> None:
     rng = np.random.default_rng(3)

@@ -45,7 +45,7 @@ def exact(means: Sequence[float], sds: Sequence[float]) -> tuple[float, float, f
 gaussians = st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(0.15, 0.7)), min_size=2, max_size=4)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(gaussians)
 def test_gaussians_are_combined_as_the_closed_form_says(told: list[tuple[float, float]]) -> None:
     found = together(*(gaussian(m, s) for m, s in told))

@@ -15,7 +15,7 @@ from muslin.inference.embedding.rkhs import RKHSEmbedding  # noqa: E402
 LAYER = RKHSEmbedding(2, 2000, 1.0, torch.Generator().manual_seed(0))
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(1, 12), st.integers(0, 2**31), st.integers(0, 5))
 def test_set_embedding_ignores_order_and_unseen_points(count: int, seed: int, unseen: int) -> None:
     g = torch.Generator().manual_seed(seed)

@@ -43,7 +43,7 @@ def curved(unit: FloatArray) -> FloatArray:
     return np.asarray(MATRIX @ (np.exp(2.0 * unit) - np.exp(2.0 * TRUE)) + NOISE)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.lists(st.floats(0.0, 1.0), min_size=4, max_size=4))
 def test_the_least_square_within_the_cube(start: list[float]) -> None:
     for function, most in ((linear, 12), (curved, 40)):

@@ -78,7 +78,7 @@ def test_options_that_cannot_be_are_refused(options: dict[str, object], told: st
         ColorMaskExtractor(**options)  # type: ignore[arg-type]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.tuples(*[st.integers(0, 255)] * 3), st.floats(0, 360), st.floats(0, 360), st.floats(0, 1), st.floats(0, 1))
 def test_a_range_holds_what_colorsys_says(
     rgb: tuple[int, int, int], low: float, high: float, a: float, b: float
@@ -110,7 +110,7 @@ def test_a_grey_colour_is_found_by_its_brightness() -> None:
     assert not object_mask(pictures((240, 240, 240)), wanted).any()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(1, 80), st.integers(1, 80), st.integers(1, 50))
 def test_subsets_have_their_size_and_no_point_twice(height: int, width: int, count: int) -> None:
     cells = np.argwhere(np.ones((height, width), bool))
