@@ -95,7 +95,7 @@ def carried(turn: FloatArray) -> tuple[Scenario, Recording]:
     return measured_start(plain.for_recording(recording), recording), recording
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1))
 def test_it_turns_with_the_gripper(turn: tuple[float, ...]) -> None:
     """So however a rope is held, all its recordings tell the same."""

@@ -49,7 +49,7 @@ def annotations(draw: st.DrawFn) -> Annotations:
     return Annotations(names, frames, points, flags, sizes, tuple(edges), video)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(made=annotations())
 def test_what_is_written_is_read(made: Annotations, tmp_path_factory: pytest.TempPathFactory) -> None:
     path = tmp_path_factory.getbasetemp() / "k.json"

@@ -41,7 +41,7 @@ def recordings(draw: st.DrawFn, name: str, unit: str) -> Recording:
     return Recording(name, series, gripper, draw(st.sampled_from(["", "fling"])), draw(st.floats(0, 5)))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.data())
 def test_round_trip(data: st.DataObject) -> None:
     unit = data.draw(st.sampled_from(["m", "px"]))

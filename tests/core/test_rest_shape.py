@@ -18,7 +18,7 @@ def twisted_curve(seed: int):
     return rope_line(s * rng.normal(0, 1, 3) + sum(waves), 14)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), share=st.floats(0.0, 1.0))
 def test_it_turns_by_a_share_everywhere_and_is_as_long(seed, share):
     body = twisted_curve(seed)

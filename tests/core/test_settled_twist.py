@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from muslin.core.arrays import FloatArray
@@ -44,7 +44,6 @@ def test_a_bend_turns_into_the_plane_in_which_the_rope_is_bent() -> None:
     assert (found[0, [0, -1]] == 0.0).all()
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000))
 def test_no_other_twist_near_it_has_less_energy(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -30,7 +30,7 @@ def test_the_distance_of_squares_is_known() -> None:
     assert mask_chamfer(square(5, 5), np.zeros((1, 40, 40), bool)) == pytest.approx(np.hypot(40, 40))
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data(), st.integers(1, 24), st.integers(1, 24))
 def test_the_distance_is_that_of_brute_force(data: st.DataObject, height: int, width: int) -> None:
     one, other = (data.draw(hnp.arrays(bool, (1, height, width))) for _ in range(2))
@@ -42,7 +42,7 @@ def test_the_distance_is_that_of_brute_force(data: st.DataObject, height: int, w
     assert found == mask_chamfer(other, one)[0]
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(hnp.arrays(bool, (1, 12, 16)), hnp.arrays(float, (1, 5, 2), elements=st.floats(-3, 18)))
 def test_the_distance_of_points_is_that_of_brute_force(mask: BoolArray, points: FloatArray) -> None:
     found = point_chamfer(points, mask)[0]

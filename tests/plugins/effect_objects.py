@@ -27,7 +27,7 @@ LYING = Body("cloth", SHEET.vertices[:, [0, 2, 1]], SHEET.elements, SHEET.grid)
 BLOCK = solid_box(np.zeros(3), np.array([0.1, 0.2, 0.3]), (3, 3, 3))
 ROPE = rope_line(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), 11)
 #: For hypothesis: the same cases every time, however busy the machine.
-cases = settings(max_examples=60, deadline=None, derandomize=True)
+cases = settings(max_examples=60, derandomize=True)
 #: The effects that muslin ships.
 EFFECTS = sorted(
     entry.name

@@ -41,7 +41,7 @@ def forces(*path: FloatArray) -> FloatArray:
     return [lengthening.force(moved, 1.0) for moved in path][-1].reshape(-1, 3)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.001, 0.1), st.floats(0.001, 0.1))
 def test_it_moves_and_turns_nothing_as_a_whole(first: float, second: float) -> None:
     moved = turned(first + second)
