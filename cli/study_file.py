@@ -106,7 +106,7 @@ def _placed(plan: Plan) -> list[str]:
 
 
 def _marker_points(plan: Plan) -> list[str]:
-    head = "# or a place for each on a flat cloth, in the frame of the object [m]:"
+    head = "# or, in its place, where each is on a flat cloth, in the frame of the object [m]:"
     if plan.marker_points is None:
         return [head, "# marker_points = [[0.0, 0.0, 0.0]]"]
     return [head, "marker_points = [", *(f"    {_value(p)}," for p in plan.marker_points), "]"]

@@ -20,7 +20,7 @@ def muslin(tmp_path: Path) -> Muslin:
             cwd=tmp_path,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=600,
             preexec_fn=limit,
             env={**os.environ, "MUSLIN_DEBUG": "", "COLUMNS": "100", **environment},
         )
