@@ -7,7 +7,7 @@ from ..core.measurement import Recording
 from ..core.pose_span import uncovered
 from ..core.scenario import Scenario
 from ..core.study import Problem
-from .rope_start import on_a_line
+from .rope_start import like_a_rope
 
 #: At the start points are no further from where the model puts them than this share of the object's size; as the model
 #: does not know how a real object hangs they are some hundredths of it away.
@@ -48,7 +48,7 @@ def doubtful_starts(problem: Problem) -> list[str]:
         remarks += _out_of_hand(recording, scenario, size)
         if scenario.body.kind == "solid":
             remarks += _beside(recording, scenario)
-        if scenario.body.kind == "cloth" and on_a_line(recording.series.points[0]):
+        if scenario.body.kind == "cloth" and like_a_rope(recording.series.points[0]):
             remarks.append(
                 f"warning: all points of {name} start on one line; if they are those of a rope, give its length with "
                 "--size LENGTH"

@@ -96,8 +96,10 @@ def seen_sheet(base: Preset, recordings: Sequence[Recording], size: Sequence[flo
         recordings: that are fitted.
         size: width and height [m], if the person gave them.
     """
+    if len({(r.series.points.shape[1:], r.series.correspondence, r.series.unit) for r in recordings}) > 1:
+        return None
     frames = [frame for r in recordings if (frame := _flattened(r, size)) is not None]
-    if not frames or len({r.series.points.shape[1] for r in recordings}) > 1:
+    if not frames:
         return None
     flattest = min(frames, key=lambda frame: frame.off)
     seen = replace(flattest, points=_together(flattest, frames))

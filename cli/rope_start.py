@@ -7,7 +7,7 @@ import numpy as np
 from ..core.arrays import FloatArray
 from ..core.measurement import Recording
 from ..core.registry import REGISTRY
-from ..core.scenarios.laid import before_it_moves
+from ..core.scenarios.laid import before_it_moves, on_a_line
 from .study_plan import Plan
 
 #: Markers that tell the shape of a rope are so many at least, the outer ones as near to the grippers, over its length,
@@ -16,8 +16,8 @@ _FEWEST_MARKERS, _AT_THE_GRIPPER, _IN_ORDER = 6, 0.03, 1.3
 #: A rope that sags by this share of its length sags down, in the mean over its takes, to so many degrees: one that
 #: keeps a bend, or is swung, sags aside by far less.
 _SAGS, _ASIDE = 0.05, 60.0
-#: So many points at least whose spread beside their line is less than this share of that along it are on a line.
-_FEWEST_OF_A_LINE, _NARROW = 4, 0.02
+#: So many points on a line are those of a rope.
+_FEWEST_OF_A_LINE = 4
 #: A gripper holds the end of a line if it is no further beside it than this share of its length, nor from there inward.
 _AT_AN_END = 0.05
 
@@ -115,7 +115,7 @@ def _from_hand_to_tip(recording: Recording) -> float | None:
     if not series.correspondence or series.unit != "m" or recording.gripper is None:
         return None
     first, _ = before_it_moves(recording)
-    if not on_a_line(first):
+    if not like_a_rope(first):
         return None
     seen = first[np.isfinite(first).all(axis=1)]
     hand = recording.gripper.at(series.time[:1])[0, 0, :3]
@@ -128,10 +128,7 @@ def _from_hand_to_tip(recording: Recording) -> float | None:
     return length if max(beside, inward) <= _AT_AN_END * length else None
 
 
-def on_a_line(points: FloatArray) -> bool:
-    """Whether ``points (P, 3)``, four or more, lie on one line."""
+def like_a_rope(points: FloatArray) -> bool:
+    """Whether those of ``points (P, 3)`` that are seen, four or more, lie on one line."""
     seen = points[np.isfinite(points).all(axis=1)]
-    if len(seen) < _FEWEST_OF_A_LINE or points.shape[1] != 3:
-        return False
-    sizes = np.linalg.svd(seen - seen.mean(axis=0), compute_uv=False)
-    return bool(sizes[1] < _NARROW * sizes[0])
+    return len(seen) >= _FEWEST_OF_A_LINE and seen.shape[1] == 3 and on_a_line(seen)

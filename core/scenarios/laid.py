@@ -12,8 +12,8 @@ from ..scenario import Scenario
 
 #: Grippers that are within this of where they started have not moved [m].
 _STILL = 1e-3
-#: Markers are on a line if they spread beside it by less than this share of what they do along it.
-_LINE = 1e-3
+#: Points are on a line if they spread beside it by less than this share of what they do along it.
+_LINE = 0.02
 
 
 def laid_under(scenario: Scenario, recording: Recording) -> Scenario:
@@ -38,11 +38,13 @@ def laid_under(scenario: Scenario, recording: Recording) -> Scenario:
             f"{told} in {scenario.name!r} the object does not start in its rest shape, but in one that follows from "
             "the grippers; leave frame out"
         )
+    if len(scenario.markers) != recording.series.points.shape[1]:
+        raise InputError(f"{told} its points are found in pictures, and sit nowhere on the object; take another frame")
     first, _ = before_it_moves(recording)
     seen = np.asarray(np.isfinite(first).all(axis=1))
     at_rest = scenario.world_vertices()
     places = scenario.markers @ at_rest
-    if seen.sum() < 3 or _on_a_line(places[seen]) or _on_a_line(first[seen]):
+    if seen.sum() < 3 or on_a_line(places[seen]) or on_a_line(first[seen]):
         raise InputError(
             f"{told} {int(seen.sum())} of {len(seen)} markers are seen before a gripper moves, and it takes three "
             "that are not on one line; import from a later --start, or take another frame"
@@ -81,6 +83,7 @@ def rigid(places: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]
     return turn, other - turn @ one
 
 
-def _on_a_line(points: FloatArray) -> bool:
+def on_a_line(points: FloatArray) -> bool:
+    """Whether ``points (P, 3)`` lie on one line, but for noise."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(sizes[1] <= _LINE * sizes[0])
+    return bool(sizes[1] < _LINE * sizes[0])

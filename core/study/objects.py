@@ -112,7 +112,7 @@ def build_scenario(
     if not marked:
         return plain
     if table.marker_points is not None:
-        weights = marker_points(given, np.array(table.marker_points))
+        weights = marker_points(given, np.array(table.marker_points).reshape(-1, 3))
         return replace(plain, markers=_as_many(weights, recording, "marker_points", "points"))
     return replace(plain, markers=_markers(table.markers, plain, recording), sampled=table.markers == "surface")
 

@@ -82,6 +82,8 @@ def test_what_does_not_tell_it_is_refused() -> None:
         laid_under(scenario, replace(recording, series=replace(recording.series, points=line)))
     with pytest.raises(InputError, match="not followed"):
         laid_under(scenario, replace(recording, series=replace(recording.series, correspondence=False)))
+    with pytest.raises(InputError, match="sit nowhere on the object"):
+        laid_under(replace(scenario, markers=np.eye(63)), recording)
     rope = preset("cable").scenario()
     with pytest.raises(InputError, match="does not start in its rest shape"):
         laid_under(rope, recording)
@@ -96,6 +98,7 @@ def test_what_does_not_tell_it_is_refused() -> None:
             {"marker_points": [[0.5, 0.0, -0.1], *PLACES[1:]]},
             r"marker 0 at \[0.5, 0.0, -0.1\] m is not on the sheet",
         ),
+        ({"marker_points": []}, "names 0 points, but recording 'one' has 4 points"),
         ({"marker_points": PLACES[:3]}, "names 3 points, but recording 'one' has 4 points"),
         ({"name": "cable", "size": [1.0], "vertices": [41]}, "for a cloth that is flat at rest, but this is a rope"),
         ({"start": "measured", "name": "cable", "size": None, "vertices": [41]}, "leave marker_points, frame out"),
