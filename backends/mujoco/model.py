@@ -57,6 +57,7 @@ class Model:
         masses: of every vertex ``(V,)`` [kg], loads included.
         soft_bending: what bending MuJoCo does not know, as a matrix ``(V, V)`` [N/m], or ``(0, 0)``.
         damping_times: of the material of every flex ``(F,)`` [s].
+        segments: where the lengths at rest of a rope's segments are in the model ``(E,)``; of others none.
     """
 
     model: "mujoco.MjModel"
@@ -67,6 +68,7 @@ class Model:
     masses: FloatArray
     soft_bending: FloatArray
     damping_times: FloatArray
+    segments: IntArray
 
 
 def compiled(scene: Scene, time_step: float) -> Model:
@@ -108,11 +110,13 @@ def compiled(scene: Scene, time_step: float) -> Model:
     stretch, cells = _write_material(model, scene, bending)
     turn = frame(body) if quadratic_cells(body) else np.eye(3)
     turned = None if np.array_equal(turn, np.eye(3)) else turn
-    damping_times = np.full(model.nflex, scene.material.damping_time)
+    damping_times, segments = np.full(model.nflex, scene.material.damping_time), np.zeros(0, np.int64)
     if isinstance(scene.material, RopeMaterial):
         second = engine().mj_name2id(model, engine().mjtObj.mjOBJ_FLEX, "second")
         damping_times[second] = rod.stretch_damping(body, scene.material, masses, scene.held)
-    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft, damping_times)
+        first_edges = model.flex_elemedge[model.flex_elemedgeadr[second] :][: 3 * len(body.elements) : 3]
+        segments = model.flex_edgeadr[second] + first_edges
+    return Model(model, stretch, cells, turned, np.concatenate([held, clamped]), masses, soft, damping_times, segments)
 
 
 @lru_cache(maxsize=4)

@@ -13,6 +13,7 @@ from .lengthening import Lengthening
 from .model import compiled
 from .rod import looking_back, start_turn, start_twists
 from .soft_bending import SoftBending
+from .turning import Turning
 
 #: How far beyond MuJoCo's own step, as a part of it, cloth and solids are thrown, see :class:`~.gliding.Thrown`; 1
 #: would not damp at all.
@@ -82,6 +83,10 @@ class MujocoWorld(World):
             self._gliding = TwoStep(time_step, back, count)
         self._paced = (0.0, 0.0)
         self._stretch, self._cells = made.stretch, made.cells
+        self._turning: Turning | None = None
+        if len(made.segments):
+            lengths = self._model.flexedge_length0
+            self._turning = Turning(scene.body.vertices, made.stretch, lengths, made.segments)
         self._lengthening: Lengthening | None = None
         if scene.body.kind == "cloth" and scene.material.damping_time > time_step:
             self._lengthening = Lengthening(scene.body.elements, scene.body.vertices, made.stretch)
@@ -124,6 +129,8 @@ class MujocoWorld(World):
         if turns is not None and len(self._start_turns):  # a rope of one segment has no twist
             np.add(self._start_turns, turns, out=self._target_turns)
         if self._touching or not self._glide(forces):
+            if self._turning is not None:
+                self._turning.forget()
             self._pace(self.time_step, self.time_step)
             self._drive(self.time_step)
             self._load(forces, 0.0)
@@ -166,13 +173,25 @@ class MujocoWorld(World):
         self._pace(gliding.step, gliding.own_damping)
         gliding.begin(self._moved, self._moving)
         self._drive(gliding.way)
-        self._load(gliding.forces(forces), self.time_step - gliding.step)
+        pushed = gliding.forces(forces)
+        turned = self._turned()
+        if turned is not None:
+            pushed = turned if pushed is None else pushed + turned
+        self._load(pushed, self.time_step - gliding.step)
         self._step(self._model, self._data)
         if self._data.ncon:
             self._qpos[:], self._qvel[:] = self._before
             return False
         gliding.end(self._moved, self._moving)
         return True
+
+    def _turned(self) -> FloatArray | None:
+        """What makes up for the turning of a rope in the step that begins ``(3 V,)`` [N]."""
+        if self._turning is None:
+            return None
+        step = self._gliding.step
+        damped = self._model.flex_damping.min() / step  # stretch is damped no longer than bending
+        return self._turning.force(self._before[0][: len(self._moved)], 1.0 - step / self.time_step, damped)
 
     def _pace(self, step: float, own_damping: float) -> None:
         """Let MuJoCo step by ``step`` [s], and take ``own_damping`` [s] off the damping times of the material."""

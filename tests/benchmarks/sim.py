@@ -255,6 +255,8 @@ def time_steps(rows: list[Row]) -> None:
             rows.append(Row(f"(f) {name}, PyBullet from MuJoCo at {1e3 * step:g} ms", apart(other, path), "mm RMS"))
     with patch("muslin.backends.mujoco.rod.stretch_damping", lambda body, material, *_: material.damping_time):
         from_the_smallest(rows, "that rope with its stretch damped as long", rope, damped)
+    with patch("muslin.backends.mujoco.turning.Turning.force", lambda *_: None):
+        from_the_smallest(rows, "the first rope slowed down where it turns", rope, string)
     with patch("muslin.backends.mujoco.lengthening.Lengthening.force", lambda _, moved, steps: np.zeros(moved.size)):
         from_the_smallest(rows, "that cloth held by its damping where its edges get longer", sheet, felt)
 
