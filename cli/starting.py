@@ -50,20 +50,20 @@ def new(
         str, typer.Option(metavar="NAME", help="The posterior estimator; muslin plugins lists them.")
     ] = "npe-rkhs",
     fit_on: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             metavar="A,B",
             help="Recordings that the fit sees; default all that are not held out, or of more than nine five.",
         ),
-    ] = "",
+    ] = None,
     hold_out: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
-            metavar="C",
-            help="Recordings kept back, on which every claim is checked; default none, or four where the fit sees five "
-            "of many.",
+            metavar="C,D",
+            help="Recordings kept back, on which every claim is checked; default one of every three motions, or four "
+            "where the fit sees five of many.",
         ),
-    ] = "",
+    ] = None,
     size: Annotated[
         str,
         typer.Option(
@@ -199,7 +199,7 @@ def _takes(
     total = len(measured.names)
     rest = total - len(fitted) - len(held)
     others = f"; the other {rest} stay in the measurement, untouched" if rest else ""
-    told = f"chosen of {total} takes, evenly from the slowest start to the fastest{others}"
+    told = f"chosen of {total} takes, so that what is held out starts neither fastest nor slowest{others}"
     return fitted, held, [f"{told}; --fit-on and --hold-out choose otherwise"]
 
 
@@ -224,8 +224,9 @@ def _points(text: str) -> list[list[float]]:
     return points
 
 
-def _names(text: str, measured: Measurement, option: str) -> list[str]:
-    names = [n.strip() for n in text.split(",") if n.strip()]
+def _names(given: list[str] | None, measured: Measurement, option: str) -> list[str]:
+    """Names with commas between them, of an option that may be given more than once."""
+    names = [n.strip() for text in given or () for n in text.split(",") if n.strip()]
     for name in names:
         try:
             measured[name]

@@ -16,25 +16,27 @@ Thing = TypeVar("Thing")
 
 
 def chosen(recordings: Sequence[Recording]) -> tuple[list[str], list[str]]:
-    """Names of what is fitted, and of what is held out: all and none of few takes, and some of many.
+    """Names of what is fitted, and of what is held out: of fewer than three motions all and none.
 
-    Of many, motions are spread evenly from that which starts slowest to that which starts fastest, and are fitted and
-    held out by turns, so that what is held out lies between what was fitted. All takes of a motion go together: a
-    repeat of what was fitted checks nothing. Those that are not seen at the start come last, and are left out where
-    enough others are.
+    Motions are ordered from that which starts slowest to that which starts fastest, and what is held out lies between
+    what is fitted: the middle one of every three, or, of more takes than a fit needs, every second of some that are
+    spread evenly. All takes of a motion go together: a repeat of what was fitted checks nothing. Of many takes those
+    that are not seen at the start come last, and are left out where enough others are.
     """
     count = FITTED + HELD_OUT
-    if len(recordings) <= count:
-        return [r.name for r in recordings], []
     motions: dict[str, list[Recording]] = {}
     for recording in recordings:
         motions.setdefault(recording.motion, []).append(recording)
     speeds = {name: max(start_speed(r) for r in takes) for name, takes in motions.items()}
     ordered = sorted(motions, key=speeds.__getitem__)
-    seen = [name for name in ordered if np.isfinite(speeds[name])]
-    used = spread(seen if len(seen) >= count else ordered, count)
-    fitted, held_out = ([r.name for name in part for r in motions[name]] for part in (used[0::2], used[1::2]))
-    return fitted, held_out
+    if len(recordings) > count:
+        seen = [name for name in ordered if np.isfinite(speeds[name])]
+        used = spread(seen if len(seen) >= count else ordered, count)
+        held = used[1::2]
+    else:
+        used, held = list(motions), [ordered[3 * k + 1] for k in range(len(ordered) // 3)]
+    fitted = [name for name in used if name not in held]
+    return [r.name for name in fitted for r in motions[name]], [r.name for name in held for r in motions[name]]
 
 
 def start_speed(recording: Recording) -> float:

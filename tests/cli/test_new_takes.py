@@ -44,7 +44,7 @@ def test_of_many_takes_five_are_fitted_and_four_held_out(takes: Path, capsys: py
     path = takes.with_name("s.toml")
     assert status("new", path, "--measurement", takes, "--scenario", "cable") == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "chosen of 14 takes, evenly from the slowest start to the fastest; the other 5 stay in the" in said
+    assert "chosen of 14 takes, so that what is held out starts neither fastest nor slowest; the other 5" in said
     assert "untouched; --fit-on and --hold-out choose otherwise" in said and "nothing is held out" not in said
     study = read_config(path).study
     assert study.fit_on == ["13", "10", "6", "3", "0"] and study.hold_out == ["11", "8", "5", "2"]
@@ -65,6 +65,14 @@ def test_who_says_one_of_them_is_asked_no_more(
     assert "chosen of" not in capsys.readouterr().out
     study = read_config(path).study
     assert study.fit_on == fitted and study.hold_out == held_out
+
+
+@pytest.mark.parametrize("given", [("--hold-out", "3", "--hold-out", "5"), ("--hold-out", "3,5")])
+def test_an_option_given_twice_says_as_much_as_names_with_commas(takes: Path, given: tuple[str, ...]) -> None:
+    path = takes.with_name("s.toml")
+    assert status("new", path, "--measurement", takes, "--scenario", "cable", "--fit-on", "1", *given) == 0
+    study = read_config(path).study
+    assert study.fit_on == ["1"] and study.hold_out == ["3", "5"]
 
 
 @pytest.mark.parametrize("option", [(), ("--vertices", "3,3"), ("--vertices", "5,5"), ("--hold-out", "two")])

@@ -48,9 +48,18 @@ def test_what_is_spread_are_the_middles_of_even_parts() -> None:
     assert spread(takes, 15) == spread(takes, 20) == takes
 
 
-def test_few_takes_are_all_fitted() -> None:
-    names = [f"take {k}" for k in range(9)]
-    assert chosen([moving(1.0 - 0.1 * k, name=n) for k, n in enumerate(names)]) == (names, [])
+@pytest.mark.parametrize("count, held_out", [(1, []), (2, []), (3, [1]), (5, [1]), (6, [1, 4]), (9, [1, 4, 7])])
+def test_of_few_takes_the_middle_one_of_every_three_is_held_out(count: int, held_out: list[int]) -> None:
+    speeds = np.random.default_rng(count).permutation(count)
+    fitted, held = chosen([moving(0.1 * v, name=str(v)) for v in speeds])
+    assert held == [str(k) for k in held_out]
+    assert fitted == [str(v) for v in speeds if v not in held_out]
+
+
+def test_of_few_motions_all_are_fitted() -> None:
+    takes = [moving(0.1 * k, name=f"take {k}", motion=f"motion {k % 2}") for k in range(8)]
+    fitted, held_out = chosen(takes)
+    assert sorted(fitted) == [t.name for t in takes] and held_out == []
 
 
 def test_of_many_takes_some_are_fitted_and_held_out_by_turns_from_slow_to_fast() -> None:
