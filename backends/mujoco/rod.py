@@ -64,8 +64,8 @@ def stretch_damping(body: Body, material: RopeMaterial, masses: FloatArray, held
     """Damping time [s] of the stretch, which is that of the material unless stretch cannot be seen.
 
     A step is linear in where vertices go, so that a segment that turns gets longer by the square of the angle, and the
-    more it is damped the longer it stays so, of which :class:`~.turning.Turning` takes off the most: a swung rope damped
-    for 0.2 s is 5.1 mm off at 2.5 ms, and 1.3 mm with a tenth of what is critical for the slowest mode (``make
+    more it is damped the longer it stays so. :class:`~.turning.Turning` takes most of that off: a swung rope damped for
+    0.2 s is 5.1 mm off at 2.5 ms, and 1.3 mm with a tenth of what is critical for the slowest mode (``make
     bench-sim``). How stretch comes to rest nobody sees of a rope that its own weight stretches by less than 1 %.
 
     Args:
