@@ -19,6 +19,7 @@ from ..core.store import write_text
 from ..core.study import build_problem, parse_config
 from ..core.study.choice import chosen
 from ..core.study.objects import grasps_of, keep_points, object_of
+from .clamping import clamped
 from .console import command, next_step, say
 from .doubtful import doubtful_starts
 from .output import check_output
@@ -161,6 +162,8 @@ def new(
         check_alike(plan, measured)
     elif grid is None and plan.extractor is None:
         plan, more = place_markers(plan, measured, study, body, sized=bool(sizes))
+        remarks += more
+        plan, more = clamped(plan, [keep_points(measured[name], compared) for name in fitted], body)
         remarks += more
     elif grid is None and markers.strip():
         raise InputError("--markers says where markers sit, but these points were found in pictures; leave it out")
