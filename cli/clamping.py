@@ -10,6 +10,7 @@ from ..core.body import Body
 from ..core.differences import fourth_differences, robust_sd
 from ..core.measurement import Recording
 from ..core.motion import inverse, rotate
+from ..core.scenarios import preset
 from ..core.scenarios.laid import before_it_moves
 from .study_plan import Plan
 
@@ -29,6 +30,8 @@ def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Pl
     that is clamped leaves the gripper in one direction and bends beside it, so that near markers swing less.
     """
     if plan.kind != "rope" or plan.held != [[0]] or plan.grasps is not None or plan.mesh is not None:
+        return plan, []
+    if preset(plan.scenario).obstacles:  # what it touches bends it, too
         return plan, []
     places = np.concatenate([[0.0], np.cumsum(body.measures)])
     numbers = np.arange(len(places)) if plan.markers == "all" else plan.markers
