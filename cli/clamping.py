@@ -20,7 +20,7 @@ _APART, _WITHIN = 2.0, 0.3
 #: The outer marker must swing by so many standard deviations of the noise.
 _SHOWS = 5.0
 #: If the inner marker swings by less than this share of what a straight rope has it swing by, the rope is clamped.
-_STRAIGHT = 0.65
+_STRAIGHT = 0.6
 
 
 def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Plan, list[str]]:
@@ -29,7 +29,7 @@ def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Pl
     A rope that hangs from a ring turns about it, so that a marker at twice the distance swings twice as far aside. One
     that is clamped leaves the gripper in one direction and bends beside it, so that near markers swing less.
     """
-    if plan.kind != "rope" or plan.held != [[0]] or plan.grasps is not None or plan.mesh is not None:
+    if plan.kind != "rope" or plan.held != [[0]] or plan.grasps is not None or plan.grasp_points is not None:
         return plan, []
     if preset(plan.scenario).obstacles:  # what it touches bends it, too
         return plan, []
@@ -54,14 +54,11 @@ def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray) 
         places: of the markers along the rope ``(P,)`` [m], from the gripper.
     """
     order = np.argsort(places)
-    inner = next((int(k) for k in order if places[k] > 0.0), None)
-    if inner is None:
+    close = order[(places[order] > 0.0) & (places[order] <= _WITHIN * places.max())]
+    if not len(close) or places[close[-1]] < _APART * places[close[0]]:
         return None
-    outer = int(max(order, key=lambda k: (places[k] <= _WITHIN * places.max()) * places[k]))
-    if places[outer] < _APART * places[inner]:
-        return None
-    near: list[FloatArray] = []
-    far: list[FloatArray] = []
+    inner, outer = int(close[0]), int(close[-1])
+    aside: list[FloatArray] = []
     for recording in recordings:
         series, gripper = recording.series, recording.gripper
         if not series.correspondence or series.unit != "m" or gripper is None or gripper.grippers != 1:
@@ -69,15 +66,17 @@ def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray) 
         poses = gripper.at(series.time)[:, 0]
         start = before_it_moves(recording)[0]
         back = inverse(poses[:, 3:])
-        for k, found in ((inner, near), (outer, far)):
-            at_first = rotate(back[0], start[k] - poses[0, :3])
-            found.append(rotate(back, series.points[:, k] - poses[:, :3]) - at_first)
-    one, other = np.concatenate(near), np.concatenate(far)
-    seen = np.isfinite(one).all(axis=1) & np.isfinite(other).all(axis=1)
-    one, other = one[seen], other[seen]
+        both = [
+            rotate(back, series.points[:, k] - poses[:, :3]) - rotate(back[0], start[k] - poses[0, :3])
+            for k in (inner, outer)
+        ]
+        aside.append(np.stack([*both, rotate(back, np.gradient(poses[:, :3], series.time, axis=0))]))
+    told = np.concatenate(aside, axis=1)
+    one, other, velocity = told[:, np.isfinite(told).all(axis=(0, 2))]
     rough = np.concatenate([fourth_differences(r.series.points) for r in recordings])
     noise = robust_sd(rough) if len(rough) else 0.0
-    if not seen.any() or np.sqrt(np.mean(other**2)) <= _SHOWS * noise:
+    if not other.size or np.sqrt(np.mean(other**2)) <= _SHOWS * noise:
         return None
-    slope = np.sum(one * other) / (np.sum(other**2) - other.size * noise**2)
+    # a gripper or a clock that is late moves both markers by as much, along the velocity of the gripper
+    slope = np.linalg.lstsq(np.stack([other.ravel(), velocity.ravel()], axis=1), one.ravel(), rcond=None)[0][0]
     return float(slope * places[outer] / places[inner])

@@ -54,7 +54,7 @@ def new(
         list[str] | None,
         typer.Option(
             metavar="A,B",
-            help="Recordings that the fit sees; default all that are not held out, or of more than nine five.",
+            help="Recordings that the fit sees; default all that are not held out, or of more than nine motions five.",
         ),
     ] = None,
     hold_out: Annotated[

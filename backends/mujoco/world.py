@@ -81,7 +81,7 @@ class MujocoWorld(World):
         if isinstance(scene.material, RopeMaterial):
             back = looking_back(scene.body, scene.material, scene.held, time_step)
             self._gliding = TwoStep(time_step, back, count)
-        self._paced = (0.0, 0.0)
+        self._paced, self._stretch_damped = (0.0, 0.0), 0.0
         self._stretch, self._cells = made.stretch, made.cells
         self._turning: Turning | None = None
         if len(made.segments):
@@ -189,9 +189,8 @@ class MujocoWorld(World):
         """What makes up for the turning of a rope in the step that begins ``(3 V,)`` [N]."""
         if self._turning is None:
             return None
-        step = self._gliding.step
-        damped = self._model.flex_damping.min() / step  # stretch is damped no longer than bending
-        return self._turning.force(self._before[0][: len(self._moved)], 1.0 - step / self.time_step, damped)
+        back = 1.0 - self._gliding.step / self.time_step
+        return self._turning.force(self._before[0][: len(self._moved)], back, self._stretch_damped)
 
     def _pace(self, step: float, own_damping: float) -> None:
         """Let MuJoCo step by ``step`` [s], and take ``own_damping`` [s] off the damping times of the material."""
@@ -199,6 +198,8 @@ class MujocoWorld(World):
             self._paced = step, own_damping
             self._model.opt.timestep = step
             self._model.flex_damping[:] = np.maximum(self._damping_times - own_damping, 0.0)
+            # a rope's stretch is damped no longer than its bending
+            self._stretch_damped = float(self._model.flex_damping.min()) / step
 
     def _set_stiffness(self, factor: FloatArray | None) -> None:
         """Scale each row of the model's stretch stiffness by the mean of its elements' factors ``(E,)``."""

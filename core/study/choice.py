@@ -19,8 +19,8 @@ def chosen(recordings: Sequence[Recording]) -> tuple[list[str], list[str]]:
     """Names of what is fitted, and of what is held out: of fewer than three motions all and none.
 
     Motions are ordered from that which starts slowest to that which starts fastest, and what is held out lies between
-    what is fitted: the middle one of every three, or, of more takes than a fit needs, every second of some that are
-    spread evenly. All takes of a motion go together: a repeat of what was fitted checks nothing. Of many takes those
+    what is fitted: the middle one of every three, or, of more motions than a fit needs, every second of some that are
+    spread evenly. All takes of a motion go together: a repeat of what was fitted checks nothing. Of many motions those
     that are not seen at the start come last, and are left out where enough others are.
     """
     count = FITTED + HELD_OUT
@@ -29,7 +29,7 @@ def chosen(recordings: Sequence[Recording]) -> tuple[list[str], list[str]]:
         motions.setdefault(recording.motion, []).append(recording)
     speeds = {name: max(start_speed(r) for r in takes) for name, takes in motions.items()}
     ordered = sorted(motions, key=speeds.__getitem__)
-    if len(recordings) > count:
+    if len(motions) > count:
         seen = [name for name in ordered if np.isfinite(speeds[name])]
         used = spread(seen if len(seen) >= count else ordered, count)
         held = used[1::2]

@@ -48,11 +48,25 @@ def recorded(grasp: list[int], rigidity: float, seed: int, sweep: float = 0.15, 
 @pytest.mark.parametrize("rigidity", [1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("turn", [0.0, 0.5])
 def test_near_a_clamp_a_rope_swings_less(rigidity: float, turn: float) -> None:
-    """It follows a hand that turns, too; in a ring it is as good as straight near the hand."""
-    places = 0.02 * MARKERS
-    clamp, ring = (swing_near_the_gripper([recorded(g, rigidity, 1, turn=turn)], places) for g in ([0, 1], [0]))
+    """It follows a hand that turns, too; in a ring it is as good as straight near the hand. Of two takes."""
+    takes = ([recorded(grasp, rigidity, k, turn=turn) for k in (0, 1)] for grasp in ([0, 1], [0]))
+    clamp, ring = (swing_near_the_gripper(both, 0.02 * MARKERS) for both in takes)
     assert clamp is not None and ring is not None
-    assert clamp < 0.55 and 0.8 < ring < 1.15
+    assert clamp < 0.55 and 0.7 < ring < 1.15
+
+
+@pytest.mark.parametrize("late", [-0.05, -0.02, 0.02, 0.05])
+def test_a_late_gripper_makes_no_clamp_of_a_ring(late: float) -> None:
+    """Of one whose poses are off by 20 ms at most a clamp is still seen."""
+    shares = []
+    for grasp in ([0], [0, 1]):
+        take = recorded(grasp, 1e-3, 1)
+        assert take.gripper is not None
+        take = replace(take, gripper=Motion(take.gripper.times - late, take.gripper.poses))
+        shares.append(swing_near_the_gripper([take], 0.02 * MARKERS))
+    ring, clamp = shares
+    assert ring is not None and ring > 0.75
+    assert abs(late) > 0.02 or (clamp is not None and clamp < 0.55)
 
 
 def test_what_does_not_swing_or_has_no_marker_near_tells_nothing() -> None:
@@ -62,14 +76,17 @@ def test_what_does_not_swing_or_has_no_marker_near_tells_nothing() -> None:
     assert swing_near_the_gripper([shaken], 0.02 * MARKERS + 0.3) is None
 
 
-@pytest.mark.parametrize("grasp", [[0], [0, 1]])
+@pytest.mark.parametrize("grasp, options", [([0], ()), ([0, 1], ()), ([0, 1], ("--grasp-points", "0,0,0"))])
 def test_a_new_study_holds_a_rope_as_its_gripper_does(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], grasp: list[int]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], grasp: list[int], options: tuple[str, ...]
 ) -> None:
+    """Unless the person says how it is held."""
+    seen = len(grasp) == 2 and not options
     save_measurement(Measurement(tuple(recorded(grasp, 3e-4, k) for k in range(2))), tmp_path / "m.zarr")
     path = tmp_path / "s.toml"
     with pytest.raises(SystemExit) as caught:
-        main.run(["new", str(path), "--measurement", str(tmp_path / "m.zarr"), "--scenario", "swing"])
+        size = ("--size", "0.8") if options else ()
+        main.run(["new", str(path), "--measurement", str(tmp_path / "m.zarr"), "--scenario", "swing", *size, *options])
     assert not caught.value.code
-    assert (SAID in " ".join(capsys.readouterr().out.split())) == (len(grasp) == 2)
-    assert read_config(path).scenario.grasps == (None if grasp == [0] else [[0, 1]])
+    assert (SAID in " ".join(capsys.readouterr().out.split())) == seen
+    assert read_config(path).scenario.grasps == ([[0, 1]] if seen else None)

@@ -77,6 +77,8 @@ def test_takes_of_a_motion_stay_together() -> None:
     assert fitted[:3] == ["0a", "0b", "0c"] and (len(fitted), len(held_out)) == (15, 12)
     fitted, held_out = chosen([replace(t, motion=f"m{int(t.name[:-1]) % 3}") for t in takes])
     assert (len(fitted), len(held_out)) == (24, 12)  # three motions, of which one is held out
+    fitted, held_out = chosen([replace(t, motion=f"m{int(t.name[:-1]) % 2}") for t in takes])
+    assert (len(fitted), len(held_out)) == (36, 0)  # of two neither lies between the others
     assert chosen([replace(t, motion="one") for t in takes]) == ([t.name for t in takes], [])
 
 
