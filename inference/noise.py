@@ -8,16 +8,12 @@ import numpy as np
 from ..core.arrays import FloatArray
 from ..core.differences import fourth_differences, robust_sd
 from ..core.errors import InputError
-from ..core.interpolation import interpolate
-from ..core.measurement import Recording, repeats
+from ..core.measurement import repeats
 from ..core.study import Problem
 from .noise_draws import ar1_noise, smooth_noise
 from .patches import patch_noise
+from .repeated_noise import SLOWEST, noise_of_repeats
 
-#: Largest clock offset between repeats that is looked for, this [s] or so many frames if they are longer.
-_LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES = 0.03, 3
-#: No noise of repeats is taken to be more correlated from frame to frame.
-_SLOWEST = 0.98
 #: Where the noise of clouds is from, and what that does not tell.
 _CLOUDS = "how patches of the clouds scatter; if cameras do not agree, which that does not show, give [noise] sd"
 
@@ -95,8 +91,9 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
     """The noise of a study's recordings, with ``tails`` as the study says.
 
     Told by the study, else from repeats of the same motion, held-out takes among them (their difference
-    is pure noise, take to take variation of the object included), else from the fourth difference in
-    time, to which a smooth motion gives next to nothing; of clouds from how their patches scatter.
+    is pure noise, take to take variation of the object included) that grippers did move alike, else from
+    the fourth difference in time, to which a smooth motion gives next to nothing; of clouds from how their
+    patches scatter.
 
     Raises:
         InputError: recordings too short or too sparse for an estimate.
@@ -106,13 +103,14 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
     if told is not None:
         return Noise(told, 0.0, "given in the study", unit, 0.02, tails)
     pairs = repeats(recordings)
-    estimates = [e for e in (_from_repeats(a, b) for a, b in pairs) if e is not None]
-    if estimates:
-        variance, ar1, count = (np.array(x) for x in zip(*estimates, strict=True))
+    estimates = {(a.name, b.name): noise_of_repeats(a, b) for a, b in pairs}
+    found = {names: e for names, e in estimates.items() if e is not None and e.moved_alike}
+    if found:
+        variance, ar1, count = (np.array([getattr(e, k) for e in found.values()]) for k in ("variance", "ar1", "count"))
         sd = float(np.sqrt(np.average(variance, weights=count)))
-        correlation = float(np.clip(np.average(ar1, weights=count), 0.0, _SLOWEST))
-        takes = len({r.name for pair in pairs for r in pair})
-        independent = count.sum() * min(1.0, takes / 2 / len(pairs)) * (1 - correlation) / (1 + correlation)
+        correlation = float(np.clip(np.average(ar1, weights=count), 0.0, SLOWEST))
+        takes = len({name for names in found for name in names})
+        independent = count.sum() * min(1.0, takes / 2 / len(found)) * (1 - correlation) / (1 + correlation)
         source = f"{takes} takes that are repeats"
         error = float(1 / np.sqrt(2 * max(independent, 1.0)))
     elif len(problem.clouds) == len(recordings) and (sd := patch_noise([r.series.points for r in recordings])) > 0:
@@ -125,50 +123,10 @@ def estimate_noise(problem: Problem, told: float | None, tails: float | None = N
             example = "0.003 (in metres)" if recordings[0].series.unit == "m" else "1.0 (in pixels)"
             raise InputError(f"the noise cannot be estimated from {why}; give it in the study: [noise] sd = {example}")
         sd, correlation, source = robust_sd(rough), 0.0, "roughness in time"
+        if apart := [names for names, e in estimates.items() if e is not None]:
+            a, b = apart[0]
+            source += f"; {a} and {b} are of one motion by their names, but were moved differently"
         error = float(1.2 / np.sqrt(len(rough) / 2))
     if sd <= 0:
         raise InputError("the measurement has no noise at all; give a standard deviation: [noise] sd = 0.001")
     return Noise(sd, correlation, source, unit, error, tails)
-
-
-def _from_repeats(a: Recording, b: Recording) -> tuple[float, float, int] | None:
-    """Variance [unit2], lag-one correlation and count of numbers, from the difference of two repeats.
-
-    The clock offset between them and a constant offset are taken out. Between two frames, at the share
-    f, interpolation averages noise: white noise of variance s^2 leaves (1 + f^2 + (1 - f)^2) s^2 in the
-    difference, and a lag-one covariance of f (1 - f) s^2; both are allowed for, or half-frame shifts
-    would look best and the noise too small.
-    """
-    time = a.series.time - a.series.time[0]
-    other = b.series.time - b.series.time[0]
-    largest = max(_LARGEST_SHIFT, _LARGEST_SHIFT_FRAMES * float(np.median(np.diff(time))))
-    inside = (time >= largest) & (time <= other[-1] - largest)
-    if inside.sum() < 8:
-        return None
-    best: tuple[float, FloatArray, float] | None = None
-    for shift in np.linspace(-largest, largest, 61):
-        when = time[inside] + shift
-        d = a.series.points[inside] - interpolate(when, other, b.series.points)
-        seen = np.isfinite(d)
-        if seen.sum() < 8:
-            continue
-        d = np.where(seen, d, 0.0)
-        d = np.where(seen, d - d.sum(axis=0) / np.maximum(seen.sum(axis=0), 1), np.nan)
-        left = np.clip(np.searchsorted(other, when, side="right"), 1, len(other) - 1)
-        f = np.clip((when - other[left - 1]) / (other[left] - other[left - 1]), 0, 1)
-        mixing = float(np.mean(f * (1 - f)))
-        lost = seen.shape[0] / max(seen.shape[0] - 1, 1)  # to the constant offset
-        variance = float(np.nanmean(d**2)) * lost / (2 - 2 * mixing)
-        if best is None or variance < best[0]:
-            best = (variance, d, mixing)
-    if best is None:
-        return None
-    variance, d, mixing = best
-    both = np.isfinite(d[1:]) & np.isfinite(d[:-1])
-    covariance = float(np.mean(d[1:][both] * d[:-1][both])) if both.any() else 0.0
-    ar1 = (covariance / max(variance, 1e-300) - mixing) / 2
-    if ar1 > 0:  # the constant takes more from slow noise: Kendall 1954, and the variance of the mean of an AR(1)
-        frames = len(d)
-        ar1 = min(ar1 + (1 + 3 * ar1) / frames, _SLOWEST)
-        variance /= lost * max(1 - (1 + ar1) / (1 - ar1) / frames, 0.5)
-    return variance, ar1, int(np.isfinite(d).sum())

@@ -7,7 +7,8 @@ from muslin.core.arrays import FloatArray
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
 from muslin.inference.correlated_noise import _expected, correlated_noise
-from muslin.inference.noise import Noise, _from_repeats
+from muslin.inference.noise import Noise
+from muslin.inference.repeated_noise import noise_of_repeats
 
 #: As roughness tells noise of 3 mm with a correlation of 0.8.
 TOLD = Noise(0.00107, 0.0, "roughness in time", "m", 0.02)
@@ -89,9 +90,9 @@ def test_repeats_tell_slow_noise_as_large_as_it_is(ar1: float) -> None:
     for seed in range(6):
         points = [ar1_noise(0.003, ar1, 10 * seed + k) for k in (0, 1)]
         a, b = (Recording(str(k), PointSeries(time, p)) for k, p in enumerate(points))
-        told = _from_repeats(a, b)
+        told = noise_of_repeats(a, b)
         assert told is not None
-        found.append((told[0], told[1]))
+        found.append((told.variance, told.ar1))
     variance, lag = np.mean(found, axis=0)
     assert np.sqrt(variance) == pytest.approx(0.003, rel=0.06)
     assert lag == pytest.approx(ar1, abs=0.03)

@@ -9,7 +9,7 @@ from scipy import optimize
 from muslin.core.differences import fourth_differences
 from muslin.core.measurement import Recording
 from muslin.core.series import PointSeries
-from muslin.inference.noise import Noise, _from_repeats
+from muslin.inference.noise import Noise
 from muslin.inference.residuals import Offsets, failed, residual, rms_apart
 
 TIME = np.arange(0, 2, 0.02)
@@ -108,46 +108,6 @@ def test_roughness_finds_the_noise_of_a_smooth_motion(sd: float) -> None:
     recording = Recording("a", PointSeries(TIME, wave() + rng.normal(0, sd, wave().shape)))
     d = fourth_differences(recording.series.points)
     assert 1.4826 * np.median(np.abs(d)) == pytest.approx(sd, rel=0.15)
-
-
-@pytest.mark.parametrize("rate", [30.0, 100.0])
-@pytest.mark.parametrize("offset", [0.0, 0.4, 1.0])
-@pytest.mark.parametrize("moving", [False, True])
-def test_white_noise_of_repeats_is_found_whatever_the_clock_offset(rate: float, offset: float, moving: bool) -> None:
-    """The offset is in frames; interpolation between frames must not pass for less noise."""
-    rng, sd = np.random.default_rng(5), 0.003
-    time = np.arange(0, 3, 1 / rate)
-
-    def take(name: str, shift: float) -> Recording:
-        t = time[:, None] + shift
-        phase = np.linspace(0, 2, 8)
-        clean = np.stack([np.sin(5 * t + phase), np.cos(4 * t + phase), 0 * t + phase], axis=-1) * 0.05 * moving
-        return Recording(name, PointSeries(time, clean + rng.normal(0, sd, clean.shape)), motion="same")
-
-    found = _from_repeats(take("a", 0.0), take("b", offset / rate))
-    assert found is not None
-    assert np.sqrt(found[0]) == pytest.approx(sd, rel=0.04)
-    assert abs(found[1]) < 0.06
-
-
-def test_correlated_noise_of_repeats_is_found() -> None:
-    rng, time = np.random.default_rng(6), np.arange(0, 20, 0.01)
-
-    def take(name: str) -> Recording:
-        x = np.zeros((len(time), 6, 3))
-        for t in range(1, len(x)):
-            x[t] = 0.7 * x[t - 1] + 0.001 * rng.normal(size=(6, 3))
-        return Recording(name, PointSeries(time, x), motion="same")
-
-    found = _from_repeats(take("a"), take("b"))
-    assert found is not None
-    assert found[1] == pytest.approx(0.7, abs=0.08)
-
-
-def test_repeats_that_are_too_short_tell_nothing() -> None:
-    time = np.arange(0, 0.09, 0.01)
-    a, b = (Recording(n, PointSeries(time, np.ones((9, 2, 3))), motion="same") for n in "ab")
-    assert _from_repeats(a, b) is None
 
 
 def waving_sheet(time: np.ndarray, places: np.ndarray) -> np.ndarray:
