@@ -102,15 +102,20 @@ def test_nothing_changes_where_neighbours_cannot_be_simulated() -> None:
 
 
 def test_a_rope_that_buckles_is_not_told_too_surely(tmp_path: Path) -> None:
+    """Where a search ends there is left to chance, which processors differ in; so of several, most."""
     pytest.importorskip("mujoco")
     problem, noise = buckling_study(tmp_path).problem, Noise(0.001, 0.0, "test", "m", 0.01)
-    truth, start = np.full(len(problem.space), 0.5), np.full(len(problem.space), 0.45)
+    truth = np.full(len(problem.space), 0.5)
+    by_slopes, past_chance = [], []
     with SimulationPool(problem, 0) as pool:
         rough = roughness(pool, problem.space, truth, ("down",))
         discrepancy = rough.discrepancy(problem.recordings, noise, Offsets())
         objective = Objective(pool, problem.space, ("down",), noise, Offsets(), discrepancy=discrepancy)
-        near = polish(objective, start)
-        seen = seen_past_chance(objective, near)
-    away = np.abs(near.unit - truth)
-    assert (away > 10 * np.sqrt(np.diag(near.covariance))).any()
-    assert (away < 3 * np.sqrt(np.diag(seen.covariance))).all()
+        for start in truth + 0.05 * np.array([(-1, -1), (1, 1), (-1, 1), (1, -1), (-0.9, -1), (0.6, 0.8)]):
+            near = polish(objective, start)
+            seen = seen_past_chance(objective, near)
+            away = np.abs(near.unit - truth)
+            by_slopes.append((away > 10 * np.sqrt(np.diag(near.covariance))).any())
+            past_chance.append((away > 3 * np.sqrt(np.diag(seen.covariance))).any())
+    assert sum(by_slopes) >= 3
+    assert sum(past_chance) <= 2
