@@ -10,6 +10,7 @@ from ..core.body import Body
 from ..core.differences import fourth_differences, robust_sd
 from ..core.measurement import Recording
 from ..core.motion import inverse, rotate
+from ..core.scenario import STANDARD_GRAVITY
 from ..core.scenarios import preset
 from ..core.scenarios.laid import before_it_moves
 from .study_plan import Plan
@@ -19,15 +20,16 @@ from .study_plan import Plan
 _APART, _WITHIN = 2.0, 0.3
 #: The outer marker must swing by so many standard deviations of the noise.
 _SHOWS = 5.0
-#: If the inner marker swings by less than this share of what a straight rope has it swing by, the rope is clamped.
-_STRAIGHT = 0.6
+#: If the inner marker swings by less than this share of what a rope that can turn has it swing by, the rope is clamped.
+_TURNS = 0.85
 
 
 def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Plan, list[str]]:
     """The plan with the first two vertices of a rope in the gripper that seemed to hold one, if it clamps it; a remark.
 
-    A rope that hangs from a ring turns about it, so that a marker at twice the distance swings twice as far aside. One
-    that is clamped leaves the gripper in one direction and bends beside it, so that near markers swing less.
+    A rope that hangs from a ring turns about it, so that a marker at twice the distance swings twice as far aside, but
+    for how its own inertia bows it. One that is clamped leaves the gripper in one direction and bends beside it, so
+    that near markers swing less.
     """
     if plan.kind != "rope" or plan.held != [[0]] or plan.grasps is not None or plan.grasp_points is not None:
         return plan, []
@@ -37,8 +39,8 @@ def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Pl
     numbers = np.arange(len(places)) if plan.markers == "all" else plan.markers
     if isinstance(numbers, str) or numbers is None or plan.start is not None:
         return plan, []
-    share = swing_near_the_gripper(recordings, places[np.asarray(numbers)])
-    if share is None or share >= _STRAIGHT:
+    share = swing_near_the_gripper(recordings, places[np.asarray(numbers)], places[-1])
+    if share is None or share >= _TURNS:
         return plan, []
     return replace(plan, grasps=[[0, 1]], held=[[0, 1]]), [
         f"the gripper clamps the rope: near it markers swing aside by {share:.2g} of what they would if it could turn "
@@ -46,12 +48,13 @@ def clamped(plan: Plan, recordings: Sequence[Recording], body: Body) -> tuple[Pl
     ]
 
 
-def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray) -> float | None:
-    """By which share of what a straight rope has it a marker near the gripper swings aside; None if it is not known.
+def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray, length: float) -> float | None:
+    """By which share of what a rope that can turn has it a marker near the gripper swings aside; None if not known.
 
     Args:
         recordings: of a rope that one gripper holds at its beginning.
         places: of the markers along the rope ``(P,)`` [m], from the gripper.
+        length: of the rope [m].
     """
     order = np.argsort(places)
     close = order[(places[order] > 0.0) & (places[order] <= _WITHIN * places.max())]
@@ -66,17 +69,28 @@ def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray) 
         poses = gripper.at(series.time)[:, 0]
         start = before_it_moves(recording)[0]
         back = inverse(poses[:, 3:])
-        both = [
+        near, far = (
             rotate(back, series.points[:, k] - poses[:, :3]) - rotate(back[0], start[k] - poses[0, :3])
             for k in (inner, outer)
-        ]
-        aside.append(np.stack([*both, rotate(back, np.gradient(poses[:, :3], series.time, axis=0))]))
+        )
+        velocity = np.gradient(poses[:, :3], series.time, axis=0)
+        across = _across(np.gradient(velocity, series.time, axis=0), start[outer] - poses[0, :3])
+        # of a rope that hangs T y' changes along it by mu a, and the tension T by -mu g: (L - s) y'' = a / g + y'
+        bend = (rotate(back, across) / STANDARD_GRAVITY + far / places[outer]) / (length - places[outer] / 2)
+        near = near + 0.5 * places[inner] * (places[outer] - places[inner]) * bend
+        aside.append(np.stack([near, far, rotate(back, velocity)]))
     told = np.concatenate(aside, axis=1)
-    one, other, velocity = told[:, np.isfinite(told).all(axis=(0, 2))]
+    one, other, along = told[:, np.isfinite(told).all(axis=(0, 2))]
     rough = np.concatenate([fourth_differences(r.series.points) for r in recordings])
     noise = robust_sd(rough) if len(rough) else 0.0
     if not other.size or np.sqrt(np.mean(other**2)) <= _SHOWS * noise:
         return None
     # a gripper or a clock that is late moves both markers by as much, along the velocity of the gripper
-    slope = np.linalg.lstsq(np.stack([other.ravel(), velocity.ravel()], axis=1), one.ravel(), rcond=None)[0][0]
+    slope = np.linalg.lstsq(np.stack([other.ravel(), along.ravel()], axis=1), one.ravel(), rcond=None)[0][0]
     return float(slope * places[outer] / places[inner])
+
+
+def _across(vectors: FloatArray, direction: FloatArray) -> FloatArray:
+    """What of ``vectors (T, 3)`` is at right angles to a direction."""
+    unit = direction / np.linalg.norm(direction)
+    return np.asarray(vectors - (vectors @ unit)[:, None] * unit)
