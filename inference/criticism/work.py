@@ -26,17 +26,20 @@ RESERVED = 0.15
 #: Simulations of a diagnosis for every recording that is fitted, and at least, by kind of object; ropes are quick.
 A_RECORDING = {"rope": 1250, "cloth": 440, "solid": 500}
 AT_LEAST = {"rope": 1250, "cloth": 880, "solid": 1000}
+#: So many times that for the fit and the diagnosis together: a fit that took more leaves less, down to this share.
+TOGETHER, FEWEST = 1.7, 0.75
 #: Share of what the search has that is kept for pairs, where no effect alone is the answer.
 PAIRED = 0.15
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 
 
-def usual_simulations(problem: Problem) -> int:
-    """How many simulations a diagnosis may take where the study does not say."""
+def usual_simulations(problem: Problem, fitted: int) -> int:
+    """How many simulations a diagnosis may take where the study does not say, after a fit that took ``fitted``."""
     name = problem.fit_on[0]
     kind = problem.scenarios[name].body.kind
-    return max(AT_LEAST[kind], round(A_RECORDING[kind] * len(problem.fit_on) / problem.pieces))
+    usual = max(AT_LEAST[kind], round(A_RECORDING[kind] * len(problem.fit_on) / problem.pieces))
+    return round(min(usual, max(TOGETHER * usual - fitted, FEWEST * usual)))
 
 
 class Work:
@@ -57,7 +60,7 @@ class Work:
         self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-        asked = study.config.diagnose.simulations or usual_simulations(problem)
+        asked = study.config.diagnose.simulations or usual_simulations(problem, fit.simulations)
         self.limit = int((1 - RESERVED) * asked * problem.pieces)
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)

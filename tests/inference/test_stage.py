@@ -25,16 +25,19 @@ def test_a_budget_ends_where_it_is_told_to_and_that_is_remembered() -> None:
 
 
 @pytest.mark.parametrize(
-    "kind, takes, pieces, usual",
-    [("cloth", 1, 1, 880), ("cloth", 4, 1, 1760), ("rope", 2, 1, 2500), ("rope", 2, 4, 2500), ("solid", 2, 1, 1000)],
-)
-def test_more_recordings_and_objects_that_are_quick_to_simulate_get_more_simulations(
-    kind: str, takes: int, pieces: int, usual: int
+    "kind, takes, pieces, fitted, usual",
+    [
+        ("cloth", 1, 1, 300, 880), ("cloth", 4, 1, 1200, 1760), ("rope", 2, 1, 500, 2500), ("rope", 2, 4, 500, 2500),
+        ("solid", 2, 1, 500, 1000), ("cloth", 2, 1, 780, 716), ("cloth", 2, 1, 5000, 660),
+    ],
+)  # fmt: skip
+def test_more_recordings_and_quick_objects_get_more_simulations_and_a_long_fit_leaves_fewer(
+    kind: str, takes: int, pieces: int, fitted: int, usual: int
 ) -> None:
     scenario = SimpleNamespace(body=SimpleNamespace(kind=kind))
     names = [str(k) for k in range(takes * pieces)]
     problem = SimpleNamespace(fit_on=names, scenarios=dict.fromkeys(names, scenario), pieces=float(pieces))
-    assert usual_simulations(problem) == usual  # type: ignore[arg-type]
+    assert usual_simulations(problem, fitted) == usual  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("pieces", [1.0, 4.0])
