@@ -10,10 +10,13 @@ from ..core.measurement import Recording
 from ..core.scenarios.laid import before_it_moves, rigid
 from ..core.scenarios.preset import Preset
 from ..core.study import Problem
+from .unrolling import unrolled
 
 #: Markers lie in a plane if they spread out of it by less than this share of what they do along it, and are no line if
 #: they spread beside it by more than that one.
 _FLAT, _NARROW = 0.05, 0.1
+#: Markers nearest to a gripper that say how the sheet goes on there.
+_BESIDE = 6
 #: The sheet hangs by an edge unless it would be smaller, by more than this share, hanging some other way.
 _SMALLER = 0.1
 #: In a plane less steep than this nothing hangs (cosine of the angle to the vertical).
@@ -41,6 +44,7 @@ class Sheet:
         markers: where they are on it, in its own frame ``[x, y, z]`` [m].
         grasps: for every gripper the vertices that it holds; None: those of the scenario.
         known: the size was given.
+        bent: it is not flat as it starts.
         why: it is laid here, as far as it is worth a word.
     """
 
@@ -49,6 +53,7 @@ class Sheet:
     markers: list[list[float]]
     grasps: list[list[int]] | None
     known: bool
+    bent: bool = False
     why: str = ""
 
     def text(self) -> str:
@@ -57,30 +62,33 @@ class Sheet:
         held = "".join(f"; gripper {g} holds vertex {v[0]}" for g, v in enumerate(self.grasps or []))
         size = f"{self.size[0]:g} x {self.size[1]:g} m{known}"
         return (
-            f"the {len(self.markers)} points are on a flat sheet of {size}, which starts where they are in the first "
-            f"frame of each take{held}{'; ' if self.why else ''}{self.why}"
+            f"the {len(self.markers)} points are on a {'bent' if self.bent else 'flat'} sheet of {size}, which starts "
+            f"where they are in the first frame of each take{held}{'; ' if self.why else ''}{self.why}"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """Where a take starts, in the plane of its markers and about their middle.
+    """Where a take starts, on the sheet laid flat and about the middle of its markers.
 
     Args:
         points: markers ``(P, 2)`` [m].
         hands: grippers ``(G, 2)`` [m].
-        up: the vertical, of length one if the plane is upright ``(2,)``.
-        world: the markers in the world ``(P, 3)`` [m].
-        frames: how many there are of them.
-        off: how far they are from their plane, as a share of their spread in it.
+        up: how steeply the sheet rises along either axis, of length one if it is upright ``(2,)``.
+        frames: how many there are before a gripper moves.
+        off: how far markers are from a plane, as a share of their spread in it.
     """
 
     points: FloatArray
     hands: FloatArray
     up: FloatArray
-    world: FloatArray
     frames: int
     off: float
+
+    @property
+    def bent(self) -> bool:
+        """Whether the sheet is not flat in space."""
+        return self.off > _FLAT
 
     @property
     def covered(self) -> FloatArray:
@@ -89,7 +97,7 @@ class _Seen:
 
 
 def seen_sheet(base: Preset, recordings: Sequence[Recording], size: Sequence[float]) -> Sheet | None:
-    """The sheet under the markers where they lie flattest before a gripper moves; None if in no take they are flat.
+    """The sheet under the markers before a gripper moves, laid flat; None if it folds in every take.
 
     Args:
         base: the scenario, whose cloth hangs; it says what one gripper holds.
@@ -128,7 +136,7 @@ def why_elsewhere(problem: Problem) -> str | None:
 
 
 def _flattened(recording: Recording, size: Sequence[float]) -> _Seen | None:
-    """Markers before a gripper moves, in their plane; None if they lie in none, or not all are seen."""
+    """Markers before a gripper moves, on a flat sheet; None if they lie on none, or not all are seen."""
     series = recording.series
     if not series.correspondence or series.unit != "m":
         return None
@@ -136,29 +144,47 @@ def _flattened(recording: Recording, size: Sequence[float]) -> _Seen | None:
     if len(first) < 3 or not np.isfinite(first).all():
         return None
     middle = first.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(first - middle)
-    if sizes[1] < _NARROW * sizes[0] or sizes[2] > _FLAT * sizes[0]:
+    first = first - middle
+    _, sizes, axes = np.linalg.svd(first)
+    if sizes[1] < _NARROW * sizes[0]:
+        return None
+    off = float(sizes[2] / sizes[0])
+    places = first @ axes[:2].T if off <= _FLAT else unrolled(first)
+    if places is None:
         return None
     hands = np.zeros((0, 3))
     if recording.gripper is not None:
         hands = recording.gripper.at(series.time[:1])[0, :, :3] - middle
     if len(hands) > 1:
-        spread = max([float(np.ptp((first - middle) @ axes[0])), *size])
-        nearest = np.linalg.norm(hands[:, None] - (first - middle)[None], axis=2).min(axis=1)
-        if nearest.max() > _FAR * spread or np.abs(hands @ axes[2]).max() > _REACH * spread:
+        spread = max([float(np.ptp(first @ axes[0])), *size])
+        nearest = np.linalg.norm(hands[:, None] - first[None], axis=2).min(axis=1)
+        if nearest.max() > _FAR * spread:
             return None  # of another object, or in other axes
-    plane = axes[:2]
-    off = float(sizes[2] / sizes[0])
-    return _Seen((first - middle) @ plane.T, hands @ plane.T, plane[:, 2], first, frames, off)
+    held, beside = np.zeros((len(hands), 2)), np.zeros(len(hands))
+    for g, hand in enumerate(hands):
+        near = np.arange(len(first)) if off <= _FLAT else np.argsort(np.linalg.norm(first - hand, axis=1))[:_BESIDE]
+        held[g], beside[g] = _where(hand, first[near], places[near])
+    if len(hands) > 1 and beside.max() > _REACH * spread:
+        return None
+    rise = np.linalg.lstsq(places, first[:, 2], rcond=None)[0]
+    return _Seen(places, held, rise, frames, off)
+
+
+def _where(hand: FloatArray, first: FloatArray, places: FloatArray) -> tuple[FloatArray, float]:
+    """Where a gripper is on a sheet that goes on as it is under these markers ``(2,)``, and how far beside it [m]."""
+    at, on = first.mean(axis=0), places.mean(axis=0)
+    slopes = np.linalg.lstsq(places - on, first - at, rcond=None)[0]
+    away = np.linalg.lstsq(slopes.T, hand - at, rcond=None)[0]
+    return on + away, float(np.linalg.norm(hand - at - away @ slopes))
 
 
 def _together(flattest: _Seen, frames: Sequence[_Seen]) -> FloatArray:
     """Where the markers are on the sheet ``(P, 2)`` in the mean of all takes, each frame counting for one."""
-    places = np.hstack([flattest.points, np.zeros((len(flattest.points), 1))])
+    places, *others = (np.pad(frame.points, ((0, 0), (0, 1))) for frame in (flattest, *frames))
     each = []
-    for frame in frames:
-        turn, shift = rigid(places, frame.world)
-        each.append(((frame.world - shift) @ turn)[:, :2])
+    for other in others:
+        turn, shift = rigid(places, other)
+        each.append(((other - shift) @ turn)[:, :2])
     return np.asarray(np.average(each, axis=0, weights=[frame.frames for frame in frames]))
 
 
@@ -199,7 +225,7 @@ def _laid(base: Preset, seen: _Seen, axes: FloatArray, size: Sequence[float]) ->
     places = body.vertices[:, [0, 2]]
     points, hands = seen.points @ axes.T - origin, seen.hands @ axes.T - origin
     markers = [[round(float(x), 4), 0.0, round(float(z), 4)] for x, z in points]
-    sheet = Sheet(extent, counts, markers, None, bool(size))
+    sheet = Sheet(extent, counts, markers, None, bool(size), seen.bent)
     if not len(hands):
         return -float(axes[1] @ seen.up), sheet
     if len(hands) == 1:

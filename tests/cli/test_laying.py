@@ -131,6 +131,27 @@ def test_two_grippers_are_given_the_corners_that_they_hold(tmp_path: Path, grid:
     assert np.abs(hands - points[0, -2:]).max() < 2e-3
 
 
+@pytest.mark.parametrize("inwards", [0.0, 0.05])
+def test_grippers_hold_the_corners_of_a_cloth_that_bulges_between_them(tmp_path: Path, inwards: float) -> None:
+    """As it does if they are nearer to each other than it is wide; its markers may end before its edges."""
+    pytest.importorskip("mujoco")
+    u, v = np.meshgrid(np.linspace(-0.25 + inwards, 0.25 - inwards, 7), np.linspace(-inwards, -0.3 + inwards, 5))
+
+    def bulging(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.stack([1.0 + 0.2 * np.sin(u / 0.2), 2.0 + 0.2 * np.cos(u / 0.2), 3.0 + v], axis=1)
+
+    markers, corners = (np.tile(bulging(*x), (3, 1, 1)) for x in ((u.ravel(), v.ravel()), CORNERS[:, ::2].T))
+    said = new(tmp_path, take(markers, corners), *(["--size", "0.5,0.3"] if inwards else []))
+    assert "bent sheet of 0." in said and "warning" not in said
+    config = read_config(tmp_path / "study.toml").scenario
+    assert config.size is not None and config.grasps is not None
+    np.testing.assert_allclose(config.size, [0.5, 0.3], rtol=0.02)
+    scenario = Study.load(tmp_path / "study.toml").problem.scenarios["one"]
+    start = scenario.start_vertices()
+    np.testing.assert_allclose(scenario.markers @ start, markers[0], atol=4e-3)
+    np.testing.assert_allclose(start[[v[0] for v in config.grasps]], corners[0], atol=0.015 + 0.2 * inwards)
+
+
 def test_what_goes_with_the_scenario_is_left_to_it(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     scenario = preset("fling").scenario()

@@ -55,6 +55,28 @@ def test_it_starts_where_its_markers_are_wherever_the_grippers_say_they_are(turn
     np.testing.assert_allclose(held, corners, atol=1e-9)
 
 
+@given(st.tuples(unit, unit, unit), st.tuples(unit, unit, unit), st.floats(0.3, 2.0))
+def test_a_sheet_whose_markers_are_not_in_a_plane_starts_bent(turn, shift, curvature) -> None:
+    """Through all of them, wherever it is; on a finer mesh it is the same sheet, and it is no larger than it was."""
+    turned, moved = Rotation.from_rotvec(3.0 * np.array(turn)), np.array(shift)
+    places = np.array([[x, 0.0, z] for x in np.linspace(-0.2, 0.2, 5) for z in np.linspace(0.0, -0.3, 4)])
+    angle = curvature * 4.0 * places[:, 0]
+    bent = np.stack([np.sin(angle), 1.0 - np.cos(angle), 4.0 * curvature * places[:, 2]], axis=1) / (4.0 * curvature)
+    recording = seen(turned, moved)
+    points = np.tile(turned.apply(bent) + moved, (3, 1, 1))
+    recording = replace(recording, series=replace(recording.series, points=points))
+    starts = []
+    for vertices in ([9, 7], [17, 13]):
+        scenario = scenario_of(recording, marker_points=places.tolist(), vertices=vertices)
+        laid = laid_under(scenario, recording)
+        start = laid.start_vertices()
+        np.testing.assert_allclose(laid.markers @ start, points[0], atol=1e-3 if vertices[0] == 17 else 4e-3)
+        edges = np.linalg.norm(np.diff(start.reshape(vertices[1], vertices[0], 3), axis=1), axis=2)
+        np.testing.assert_allclose(edges, 0.4 / (vertices[0] - 1), rtol=0.08)
+        starts.append(start.reshape(vertices[1], vertices[0], 3))
+    np.testing.assert_allclose(starts[1][::2, ::2], starts[0], atol=1e-9)
+
+
 def test_what_is_lost_at_first_is_told_by_the_frames_before_a_gripper_moves() -> None:
     times = np.arange(6) / 10.0
     moving = np.concatenate([np.zeros(4), [0.1, 0.2]])[:, None] * [1.0, 0.0, 0.0]
