@@ -68,14 +68,14 @@ ObstacleTable = Annotated[TableTable | CylinderTable | MeshTable, Field(discrimi
 class ScenarioTable(StrictTable):
     """``[scenario]``: the object and how it is held; every key but the name overrides a built-in.
 
-    ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says
-    in which axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its
-    first pose; ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``:
-    as it stands in the world at the start; ``"markers"``: in axes of its own, laid under the markers of the first frame
-    of each take, and bent as they are, see :func:`~muslin.core.scenarios.laid.laid_under`. ``marker_points`` are where the markers sit on a
-    flat cloth, in the same axes as ``grasp_points``. ``start = "measured"`` lets a rope start through the markers of
-    the first frame, at once, and says where they are on it: its length, and so its mass, follow from each take. With
-    ``markers = "beside"`` these stand beside the axis of the rope, see
+    ``mesh`` is an object of the user's own: see :func:`~muslin.core.importing.mesh.read_body`. ``frame`` says in which
+    axes the object and ``grasp_points`` are given: ``"gripper"``: those of the first gripper at its first pose;
+    ``"upright"``: from the first gripper's first position along the axes of the world; ``"world"``: as it stands in
+    the world at the start; ``"markers"``: in axes of its own, laid under the markers of the first frame of each take
+    and bent as they are, see :func:`~muslin.core.scenarios.laid.laid_under`. ``marker_points`` are where the markers
+    sit on a flat cloth, in the same axes as ``grasp_points``. ``start = "measured"`` lets a rope start through the
+    markers of the first frame, at once, and says where they are on it: its length, and so its mass, follow from each
+    take. With ``markers = "beside"`` these stand beside the axis of the rope, see
     :func:`~muslin.core.scenarios.standoffs.told_standoffs`. With ``spacing = "measured"`` the markers of a flat cloth
     sit as far apart as the recordings that are fitted show, near where ``markers`` says, see
     :func:`~muslin.core.scenarios.spacing.told_places`.
