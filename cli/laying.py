@@ -26,6 +26,8 @@ _STEEP = 0.5
 _REACH, _FAR = 0.25, 0.5
 #: Markers further than this share of its size from where a scenario puts an object are elsewhere.
 _ELSEWHERE = 0.15
+#: The upper of two edges hangs from a gripper that is nearer to the other by less than twice this share of the size.
+_UPPER = 0.05
 #: The sheet is as large as the person says unless the markers spread over more than this times that.
 _LARGER = 1.05
 #: Vertices along the shorter side, and at most along the longer one.
@@ -231,7 +233,8 @@ def _laid(base: Preset, seen: _Seen, axes: FloatArray, size: Sequence[float]) ->
     if len(hands) == 1:
         grasps = base.grasps(body)
         held = places[grasps[0]].mean(axis=0) if grasps else np.zeros(2)
-        return float(np.linalg.norm(hands[0] - held)), sheet
+        away = float(np.linalg.norm(hands[0] - held))
+        return away - _UPPER * max(extent) * float(axes[1] @ seen.up), sheet  # a corner is of two edges
     apart = np.linalg.norm(hands[:, None] - places[None], axis=2)
     holding = [int(v) for v in np.argmin(apart, axis=1)]
     if apart.min(axis=1).max() > _REACH * max(extent) or len(set(holding)) < len(holding):

@@ -16,12 +16,13 @@ from ..core.measurement_store import load_measurement, read_found_by
 from ..core.registry import REGISTRY
 from ..core.scenarios import PRESETS, preset
 from ..core.store import write_text
-from ..core.study import build_problem, parse_config
+from ..core.study import Problem, build_problem, parse_config
 from ..core.study.choice import chosen
 from ..core.study.objects import grasps_of, keep_points, object_of
 from .clamping import clamped
 from .console import command, next_step, say
 from .doubtful import doubtful_starts
+from .holding import held_as_seen
 from .output import check_output
 from .pacing import paced
 from .placing import check_alike, parse_markers, place_markers
@@ -173,8 +174,16 @@ def new(
         check_alike(plan, measured)
     plan, more = paced(plan, [keep_points(measured[name], compared) for name in fitted])
     remarks += more
-    text = study_text(plan)
-    problem = build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
+
+    def draft(plan: Plan) -> tuple[str, Problem]:
+        text = study_text(plan)
+        return text, build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
+
+    text, problem = draft(plan)
+    plan, more = held_as_seen(plan, problem)
+    if more:
+        text, problem = draft(plan)
+    remarks += more
     remarks += doubtful_starts(problem)
     write_text(study, text)
     say(f"wrote {study}: fits {body.kind} {scenario!r} on {', '.join(fitted)}")
