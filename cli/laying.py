@@ -21,6 +21,8 @@ _BESIDE = 6
 _SMALLER = 0.1
 #: In a plane less steep than this nothing hangs (cosine of the angle to the vertical).
 _STEEP = 0.5
+#: … and one less steep than this is level.
+_LEVEL = 0.1
 #: A gripper holds the sheet if it is no further from it than this share of its size, or of the spread of its markers,
 #: nor than that one from the nearest marker.
 _REACH, _FAR = 0.25, 0.5
@@ -43,10 +45,11 @@ class Sheet:
     Args:
         size: width and height [m]; the width is along the edge that is held, or else the upper one.
         counts: vertices along them.
-        markers: where they are on it, in its own frame ``[x, y, z]`` [m].
+        markers: where they are on it, in its own frame ``[x, y, z]`` [m], as the scenario puts it there.
         grasps: for every gripper the vertices that it holds; None: those of the scenario.
         known: the size was given.
         bent: it is not flat as it starts.
+        level: it lies flat and level.
         why: it is laid here, as far as it is worth a word.
     """
 
@@ -56,6 +59,7 @@ class Sheet:
     grasps: list[list[int]] | None
     known: bool
     bent: bool = False
+    level: bool = False
     why: str = ""
 
     def text(self) -> str:
@@ -91,6 +95,11 @@ class _Seen:
     def bent(self) -> bool:
         """Whether the sheet is not flat in space."""
         return self.off > _FLAT
+
+    @property
+    def level(self) -> bool:
+        """Whether it is flat and hardly rises anywhere."""
+        return not self.bent and float(np.linalg.norm(self.up)) < _LEVEL
 
     @property
     def covered(self) -> FloatArray:
@@ -224,10 +233,13 @@ def _laid(base: Preset, seen: _Seen, axes: FloatArray, size: Sequence[float]) ->
     # a sheet larger than its markers goes on as far on either side, and downwards from several grippers
     top = high[1] if len(seen.hands) > 1 else (low[1] + high[1] + extent[1]) / 2
     origin = np.array([(low[0] + high[0]) / 2, top])
-    places = body.vertices[:, [0, 2]]
+    down = int(np.argmax(np.ptp(body.vertices[:, 1:], axis=0))) + 1  # it hangs along z, or lies along y
+    places = body.vertices[:, [0, down]]
     points, hands = seen.points @ axes.T - origin, seen.hands @ axes.T - origin
-    markers = [[round(float(x), 4), 0.0, round(float(z), 4)] for x, z in points]
-    sheet = Sheet(extent, counts, markers, None, bool(size), seen.bent)
+    markers = [[round(float(x), 4), 0.0, round(float(y), 4)] for x, y in points]
+    if down == 1:
+        markers = [[x, y, z] for x, z, y in markers]
+    sheet = Sheet(extent, counts, markers, None, bool(size), seen.bent, seen.level)
     if not len(hands):
         return -float(axes[1] @ seen.up), sheet
     if len(hands) == 1:

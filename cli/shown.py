@@ -69,10 +69,12 @@ def _grid(whole: dict[str, Any], measured: Measurement, study: Path, sized: bool
 
 
 def _sheet(whole: dict[str, Any], measured: Measurement, study: Path, size: list[float]) -> Sheet | None:
-    """The sheet under the markers, if they lie on one in the air, and not where the scenario puts its object."""
+    """The sheet under the markers, if they lie on one in the air or on a table, and not where the scenario puts it."""
     table, recordings = whole["scenario"], [measured[name] for name in whole["study"]["fit_on"]]
     base = preset(table["name"])
-    if len(table["size"]) != 2 or base.obstacles or (sheet := seen_sheet(base, recordings, size)) is None:
+    if len(table["size"]) != 2 or (sheet := seen_sheet(base, recordings, size)) is None:
+        return None
+    if base.obstacles and not sheet.level:  # what it touches may bend it
         return None
     draft = parse_config(whole | {"scenario": table | {"markers": [0] * len(sheet.markers)}}, str(study))
     why = why_elsewhere(build_problem(draft, measured, study.parent))

@@ -30,6 +30,7 @@ from .rope_start import rope_sizes
 from .shown import Shown, shown_by_markers
 from .study_file import study_text
 from .study_plan import Plan
+from .table_height import seen_table
 
 Number = TypeVar("Number", int, float)
 
@@ -131,6 +132,10 @@ def new(
         table["vertices"] = _numbers(vertices, int, "--vertices")
     if grasp_points.strip():
         table["grasp_points"] = _points(grasp_points)
+    lies = seen_table(base, [keep_points(measured[name], compared) for name in fitted])
+    if lies is not None:
+        table["obstacles"] = [{"kind": "table", "height": lies.height, "friction": lies.friction}]
+        remarks.append(f"it starts flat at {lies.height:g} m: the table is there ([scenario] obstacles)")
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
     shown = Shown() if placed or mesh or extractor else shown_by_markers(whole, measured, study, sizes)
@@ -157,6 +162,7 @@ def new(
         markers=parse_markers(markers) if grid is None else grid.markers,
         extractor=extractor,
         spacing="measured" if grid is not None and grid.uneven else None,
+        obstacles=() if lies is None else (lies,),
     )
     if sheet is not None:
         plan = replace(plan, frame="markers", grasps=sheet.grasps, marker_points=sheet.markers)

@@ -67,9 +67,8 @@ _ORDER = {
 def _scenario(plan: Plan) -> str:
     base = preset(plan.scenario)
     points = f"points = {_value(plan.points)}" if plan.points is not None else "# points = [0, 1, 2]"
-    obstacles = (
-        [f"# obstacles = {_inline([_obstacle(o) for o in base.obstacles])}  # built in"] if base.obstacles else []
-    )
+    around, own = plan.obstacles or base.obstacles, bool(plan.obstacles)
+    told = f"{'' if own else '# '}obstacles = {_inline([_obstacle(o) for o in around])}{'' if own else '  # built in'}"
     return "\n".join(
         [
             "",
@@ -82,7 +81,7 @@ def _scenario(plan: Plan) -> str:
             *([] if plan.start else [f"settle = {base.settle:g}  # time to come to rest before the first frame [s]"]),
             "# What stands around the object, in the world [m]; friction times the material's own is the Coulomb "
             "coefficient.",
-            *obstacles,
+            *([told] if around else []),
             '# obstacles = [{ kind = "table", height = 0.0, friction = 1.0 }]',
             '# obstacles = [{ kind = "cylinder", center = [0, 0, 2], axis = [0, 1, 0], radius = 0.04, length = 0.3 }]',
             '# obstacles = [{ kind = "mesh", file = "stand.stl", scale = 0.001, up = "z", position = [0, 0, 0] }]',

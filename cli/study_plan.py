@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ..core.obstacles import Table
 from ..core.parameters import Parameter
 from ..core.scenarios import preset
 from ..core.scenarios.measured import MEASURED_PRIORS
@@ -32,6 +33,7 @@ class Plan:
         frame: in which axes the object is given, None for the usual ones.
         grasps: for every gripper the vertices that it holds, None for those that the scenario or ``grasp_points`` say.
         marker_points: where the markers sit on a flat sheet [m], None for where ``markers`` says.
+        obstacles: what stands around the object, none for what the scenario has.
         near: how near the model is meant to come [m], None for as near as the noise lets it.
         window: length of the pieces that are fitted [s], None for whole recordings.
     """
@@ -58,6 +60,7 @@ class Plan:
     frame: str | None = None
     grasps: list[list[int]] | None = None
     marker_points: list[list[float]] | None = None
+    obstacles: tuple[Table, ...] = ()
     near: float | None = None
     window: float | None = None
 
