@@ -6,11 +6,22 @@ from typing import Any
 
 import pytest
 from made_up_study import make_study
+from matplotlib.figure import Figure
 from report_page import page_of
 
 from muslin.cli.report.gather import gather
 from muslin.cli.report.verdict import verdict
 from muslin.cli.report.words import NBSP, fall
+
+
+@pytest.fixture(autouse=True)
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only words are read here; drawing, most of the time of a report, is for test_report."""
+
+    def savefig(self: Figure, buffer: Any, format: str, **_: object) -> None:
+        buffer.write("<svg></svg>" if format == "svg" else b"")
+
+    monkeypatch.setattr(Figure, "savefig", savefig)
 
 
 @pytest.mark.parametrize(
