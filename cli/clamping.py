@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.arrays import FloatArray
 from ..core.body import Body
-from ..core.differences import fourth_differences, robust_sd
+from ..core.differences import rough_sd
 from ..core.measurement import Recording
 from ..core.motion import inverse, rotate
 from ..core.scenario import STANDARD_GRAVITY
@@ -81,9 +81,7 @@ def swing_near_the_gripper(recordings: Sequence[Recording], places: FloatArray, 
         aside.append(np.stack([near, far, rotate(back, velocity)]))
     told = np.concatenate(aside, axis=1)
     one, other, along = told[:, np.isfinite(told).all(axis=(0, 2))]
-    rough = np.concatenate([fourth_differences(r.series.points) for r in recordings])
-    noise = robust_sd(rough) if len(rough) else 0.0
-    if not other.size or np.sqrt(np.mean(other**2)) <= _SHOWS * noise:
+    if not other.size or np.sqrt(np.mean(other**2)) <= _SHOWS * rough_sd(r.series.points for r in recordings):
         return None
     # a gripper or a clock that is late moves both markers by as much, along the velocity of the gripper
     slope = np.linalg.lstsq(np.stack([other.ravel(), along.ravel()], axis=1), one.ravel(), rcond=None)[0][0]

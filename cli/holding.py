@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import FloatArray
-from ..core.differences import fourth_differences, robust_sd
+from ..core.differences import rough_sd
 from ..core.measurement import Recording
 from ..core.motion import inverse, rotate
 from ..core.study import Problem
@@ -52,28 +52,32 @@ def held_as_seen(plan: Plan, problem: Problem) -> tuple[Plan, list[str]]:
 
 
 def moving_in_the_hand(recordings: Sequence[Recording]) -> FloatArray | None:
-    """By how much each marker moves as the one gripper sees it, root mean square ``(P,)`` [m].
+    """By how much each marker moves as the one gripper sees it, root mean square ``(P,)`` [m]; NaN if a take lacks it.
 
     What goes with the velocity of the gripper is taken off: its clock may be late. None if nothing is known of it, or
     most markers move by no more than noise makes them.
     """
-    squares, noise = [], []
+    squares = []
     for recording in recordings:
         series, gripper = recording.series, recording.gripper
         if not series.correspondence or series.unit != "m" or gripper is None or gripper.grippers != 1:
             return None
         poses = _hand(recording)
         back = inverse(poses[:, None, 3:])
-        seen = rotate(back, series.points - poses[:, None, :3])
+        there = rotate(back, series.points - poses[:, None, :3])
         velocity = rotate(back, np.gradient(poses[:, :3], series.time, axis=0)[:, None])
-        seen, velocity = seen - np.nanmean(seen, axis=0), velocity - velocity.mean(axis=0)
-        along = np.where(np.isfinite(seen), velocity, 0.0)
-        slope = np.nansum(seen * along, axis=(0, 2)) / np.maximum(np.sum(along**2, axis=(0, 2)), 1e-12)
-        squares.append(np.nanmean((seen - slope[:, None] * along) ** 2, axis=(0, 2)))
-        noise.append(fourth_differences(series.points))
+        seen = np.isfinite(there).all(axis=2, keepdims=True)
+        frames = seen.sum(axis=0)[:, 0]
+        count = np.maximum(frames, 1)[:, None]
+        there, along = (np.where(seen, x - np.where(seen, x, 0.0).sum(axis=0) / count, 0.0) for x in (there, velocity))
+        slope = np.sum(there * along, axis=(0, 2)) / np.maximum(np.sum(along**2, axis=(0, 2)), 1e-12)
+        square = np.sum((there - slope[:, None] * along) ** 2, axis=(0, 2)) / (3 * count[:, 0])
+        squares.append(np.where(frames > 0, square, np.nan))
     moves = np.asarray(np.sqrt(np.mean(squares, axis=0)))
-    sd = robust_sd(np.concatenate(noise)) if sum(map(len, noise)) else 0.0
-    return None if not np.nanmedian(moves) > _SHOWS * sd else moves
+    known = moves[np.isfinite(moves)]
+    if not len(known) or np.median(known) <= _SHOWS * rough_sd(r.series.points for r in recordings):
+        return None
+    return moves
 
 
 def _hand(recording: Recording) -> FloatArray:

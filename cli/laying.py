@@ -10,19 +10,15 @@ from ..core.measurement import Recording
 from ..core.scenarios.laid import before_it_moves, rigid
 from ..core.scenarios.preset import Preset
 from ..core.study import Problem
-from .unrolling import unrolled
+from .unrolling import NEAREST, placed, unrolled
 
 #: Markers lie in a plane if they spread out of it by less than this share of what they do along it, and are no line if
 #: they spread beside it by more than that one.
 _FLAT, _NARROW = 0.05, 0.1
-#: Markers nearest to a gripper that say how the sheet goes on there.
-_BESIDE = 6
 #: The sheet hangs by an edge unless it would be smaller, by more than this share, hanging some other way.
 _SMALLER = 0.1
 #: In a plane less steep than this nothing hangs (cosine of the angle to the vertical).
 _STEEP = 0.5
-#: … and one less steep than this is level.
-_LEVEL = 0.1
 #: A gripper holds the sheet if it is no further from it than this share of its size, or of the spread of its markers,
 #: nor than that one from the nearest marker.
 _REACH, _FAR = 0.25, 0.5
@@ -49,7 +45,6 @@ class Sheet:
         grasps: for every gripper the vertices that it holds; None: those of the scenario.
         known: the size was given.
         bent: it is not flat as it starts.
-        level: it lies flat and level.
         why: it is laid here, as far as it is worth a word.
     """
 
@@ -59,7 +54,6 @@ class Sheet:
     grasps: list[list[int]] | None
     known: bool
     bent: bool = False
-    level: bool = False
     why: str = ""
 
     def text(self) -> str:
@@ -95,11 +89,6 @@ class _Seen:
     def bent(self) -> bool:
         """Whether the sheet is not flat in space."""
         return self.off > _FLAT
-
-    @property
-    def level(self) -> bool:
-        """Whether it is flat and hardly rises anywhere."""
-        return not self.bent and float(np.linalg.norm(self.up)) < _LEVEL
 
     @property
     def covered(self) -> FloatArray:
@@ -171,22 +160,12 @@ def _flattened(recording: Recording, size: Sequence[float]) -> _Seen | None:
         nearest = np.linalg.norm(hands[:, None] - first[None], axis=2).min(axis=1)
         if nearest.max() > _FAR * spread:
             return None  # of another object, or in other axes
-    held, beside = np.zeros((len(hands), 2)), np.zeros(len(hands))
-    for g, hand in enumerate(hands):
-        near = np.arange(len(first)) if off <= _FLAT else np.argsort(np.linalg.norm(first - hand, axis=1))[:_BESIDE]
-        held[g], beside[g] = _where(hand, first[near], places[near])
+    near = len(first) if off <= _FLAT else NEAREST
+    held, beside = placed(hands, first, places, near)
     if len(hands) > 1 and beside.max() > _REACH * spread:
         return None
     rise = np.linalg.lstsq(places, first[:, 2], rcond=None)[0]
     return _Seen(places, held, rise, frames, off)
-
-
-def _where(hand: FloatArray, first: FloatArray, places: FloatArray) -> tuple[FloatArray, float]:
-    """Where a gripper is on a sheet that goes on as it is under these markers ``(2,)``, and how far beside it [m]."""
-    at, on = first.mean(axis=0), places.mean(axis=0)
-    slopes = np.linalg.lstsq(places - on, first - at, rcond=None)[0]
-    away = np.linalg.lstsq(slopes.T, hand - at, rcond=None)[0]
-    return on + away, float(np.linalg.norm(hand - at - away @ slopes))
 
 
 def _together(flattest: _Seen, frames: Sequence[_Seen]) -> FloatArray:
@@ -239,7 +218,7 @@ def _laid(base: Preset, seen: _Seen, axes: FloatArray, size: Sequence[float]) ->
     markers = [[round(float(x), 4), 0.0, round(float(y), 4)] for x, y in points]
     if down == 1:
         markers = [[x, y, z] for x, z, y in markers]
-    sheet = Sheet(extent, counts, markers, None, bool(size), seen.bent, seen.level)
+    sheet = Sheet(extent, counts, markers, None, bool(size), seen.bent)
     if not len(hands):
         return -float(axes[1] @ seen.up), sheet
     if len(hands) == 1:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.arrays import FloatArray, IntArray
-from ..core.differences import fourth_differences, robust_sd
+from ..core.differences import rough_sd
 from ..core.measurement import Recording
 from ..core.registry import REGISTRY
 from .study_plan import Plan
@@ -70,9 +70,7 @@ def turning_rate(recording: Recording) -> float:
     rates = rates[np.isfinite(rates)]
     if not len(rates):
         return 0.0
-    rough = fourth_differences(points)
-    noise = robust_sd(rough) if len(rough) else 0.0
-    sd = 2.0 * noise / (float(np.median(span)) * float(np.nanmedian(apart)))
+    sd = 2.0 * rough_sd([points]) / (float(np.median(span)) * float(np.nanmedian(apart)))
     most = float(np.percentile(rates, _MOST))
     # of noise alone, and of noise along a motion that is faster than it
     return min(float(np.sqrt(max(0.0, most**2 - (_NOISE * sd) ** 2))), max(0.0, most - _ALONG * sd))

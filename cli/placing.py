@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.body import Body
-from ..core.differences import fourth_differences, robust_sd
+from ..core.differences import rough_sd
 from ..core.errors import InputError
 from ..core.measurement import Measurement, Recording
 from ..core.scenarios.measured import MEASURED_NEAR, MEASURED_PIECE
@@ -112,8 +112,7 @@ def _measured(plan: Plan, measured: Measurement) -> tuple[Plan, list[str]]:
     remarks = ["every take starts through its markers, from one gripper to the other; its length follows from them"]
     fitted = [keep_points(measured[name], plan.points) for name in plan.fit_on]
     remarks += sags_aside(fitted)
-    rough = np.concatenate([fourth_differences(r.series.points) for r in fitted])
-    noise = robust_sd(rough) if len(rough) else 0.0
+    noise = rough_sd(r.series.points for r in fitted)
     if 0.0 < noise < _FAR_BETTER * MEASURED_NEAR:
         plan = replace(plan, near=MEASURED_NEAR)
         remarks.append(

@@ -9,6 +9,7 @@ from ..core.scenarios import preset
 from ..core.study import build_problem, parse_config
 from .gridding import Grid, laid_over, seen_grid
 from .laying import Sheet, seen_sheet, why_elsewhere
+from .table_height import lies_at
 
 #: A cloth that is larger or smaller than this share of another is not of its size.
 _OTHER = 0.1
@@ -74,7 +75,7 @@ def _sheet(whole: dict[str, Any], measured: Measurement, study: Path, size: list
     base = preset(table["name"])
     if len(table["size"]) != 2 or (sheet := seen_sheet(base, recordings, size)) is None:
         return None
-    if base.obstacles and not sheet.level:  # what it touches may bend it
+    if base.obstacles and any(lies_at(r) is None for r in recordings):  # what it touches may bend it
         return None
     draft = parse_config(whole | {"scenario": table | {"markers": [0] * len(sheet.markers)}}, str(study))
     why = why_elsewhere(build_problem(draft, measured, study.parent))

@@ -24,7 +24,7 @@ def seen_table(base: Preset, recordings: Sequence[Recording]) -> Table | None:
     """
     if len(base.obstacles) != 1 or not isinstance(table := base.obstacles[0], Table):
         return None
-    heights = [_lies_at(r) for r in recordings]
+    heights = [lies_at(r) for r in recordings]
     if None in heights or not heights:
         return None
     found = np.array(heights, float)
@@ -34,7 +34,8 @@ def seen_table(base: Preset, recordings: Sequence[Recording]) -> Table | None:
     return Table(round(height, 3), table.friction)
 
 
-def _lies_at(recording: Recording) -> float | None:
+def lies_at(recording: Recording) -> float | None:
+    """The height at which a cloth lies flat and level before a gripper moves [m]; None if it does not."""
     series = recording.series
     if series.unit != "m" or series.points.shape[2] != 3:
         return None

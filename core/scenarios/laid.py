@@ -1,16 +1,15 @@
 """Where an object starts, told by its markers alone."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..body import Body
+from ..arrays import FloatArray
 from ..errors import InputError
 from ..measurement import Recording, check_spatial
 from ..motion import inverse, rotate
-from ..obstacles import Obstacle
 from ..scenario import Scenario
+from .bent_sheet import BentSheet
 
 #: Grippers that are within this of where they started have not moved [m].
 _STILL = 1e-3
@@ -18,49 +17,6 @@ _STILL = 1e-3
 _LINE = 0.02
 #: A sheet is bent as it starts if its markers are off a flat one by this share of their spread, root mean square.
 _BENT = 0.03
-
-
-@dataclass(frozen=True, eq=False)
-class BentAsSeen:
-    """The start of a flat sheet whose markers are not in a plane: bent as smoothly as goes through all of them.
-
-    What the sheet is moved by is a thin-plate spline over it (Duchon, *Splines minimizing rotation-invariant semi-norms
-    in Sobolev spaces*, 1977); beyond the markers it goes on nearly straight.
-
-    Args:
-        flat: where the markers would be ``(M, 3)`` [m], in the world, if the sheet were flat.
-        seen: where they are ``(M, 3)`` [m].
-    """
-
-    flat: FloatArray
-    seen: FloatArray
-
-    def __call__(
-        self,
-        body: Body,
-        poses: FloatArray,
-        grasps: tuple[IntArray, ...],
-        obstacles: tuple[Obstacle, ...],
-        clearance: float,
-    ) -> FloatArray:
-        """Vertices ``(V, 3)`` [m] of ``body``, which lies flat in the world."""
-        middle = self.flat.mean(axis=0)
-        axes = np.linalg.svd(self.flat - middle, full_matrices=False)[2][:2]
-        places, wanted = (self.flat - middle) @ axes.T, (body.vertices - middle) @ axes.T
-        count = len(places)
-        system = np.zeros((count + 3, count + 3))
-        system[:count, :count] = _thin_plate(places, places)
-        system[:count, count:] = np.pad(places, ((0, 0), (1, 0)), constant_values=1.0)
-        system[count:, :count] = system[:count, count:].T
-        pull = np.linalg.lstsq(system, np.pad(self.seen - self.flat, ((0, 3), (0, 0))), rcond=None)[0]
-        straight = np.pad(wanted, ((0, 0), (1, 0)), constant_values=1.0) @ pull[count:]
-        return np.asarray(body.vertices + straight + _thin_plate(wanted, places) @ pull[:count])
-
-
-def _thin_plate(places: FloatArray, centres: FloatArray) -> FloatArray:
-    """r^2 log r between ``(N, 2)`` and ``(M, 2)``."""
-    square = np.sum((places[:, None] - centres[None]) ** 2, axis=2)
-    return np.asarray(0.5 * square * np.log(np.maximum(square, 1e-300)))
 
 
 def laid_under(scenario: Scenario, recording: Recording) -> Scenario:
@@ -105,7 +61,9 @@ def laid_under(scenario: Scenario, recording: Recording) -> Scenario:
     spread = first[seen] - first[seen].mean(axis=0)
     if np.mean((first[seen] - flat) ** 2) <= _BENT**2 * np.mean(spread**2):
         return laid
-    return replace(laid, start=BentAsSeen(flat, first[seen]))
+    flat, bent = (rotate(inverse(pose[3:]), x - pose[:3]) for x in (flat, first[seen]))
+    about = local[laid.grasps[0]].mean(axis=0) if laid.grasps else local.mean(axis=0)
+    return replace(laid, start=BentSheet.through(flat, bent, float(laid.body.measures.sum()), about))
 
 
 def before_it_moves(recording: Recording) -> tuple[FloatArray, int]:

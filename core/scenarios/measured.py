@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import FloatArray
 from ..beside import Beside, curves
 from ..body import rope_line
-from ..differences import fourth_differences, robust_sd
+from ..differences import rough_sd
 from ..errors import InputError
 from ..interpolation import interpolate
 from ..measurement import Recording, check_spatial
@@ -122,7 +122,7 @@ def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
     time = series.time - series.time[0]
     most = int(np.searchsorted(time, LONGEST, side="right"))
     points = series.points[: max(most, _FEWEST)]
-    noise = robust_sd(differences) if len(differences := fourth_differences(points)) else 0.0
+    noise = rough_sd([points])
     best: FloatArray | None = None
     for count in range(_FEWEST, len(points) + 1):
         found, left = _parabolas(time[:count], points[:count])

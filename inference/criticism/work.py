@@ -27,7 +27,7 @@ RESERVED = 0.15
 A_RECORDING = {"rope": 1250, "cloth": 440, "solid": 500}
 AT_LEAST = {"rope": 1250, "cloth": 880, "solid": 1000}
 #: So many times that for the fit and the diagnosis together: a fit that took more leaves less, down to this share.
-TOGETHER, FEWEST = 1.7, 0.75
+TOGETHER, FEWEST = 1.65, 0.75
 #: Share of what the search has that is kept for pairs, where no effect alone is the answer.
 PAIRED = 0.15
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.

@@ -47,6 +47,14 @@ def test_what_is_held_stays_in_the_hand_though_its_clock_is_late(late: float) ->
     assert moves[TOP_LEFT] < 0.3 * np.median(moves) and moves[[TOP_RIGHT, 20, 24]].min() > 0.8 * np.median(moves)
 
 
+def test_a_marker_that_is_never_seen_is_told_nothing_of() -> None:
+    take = swung(SHEET[TOP_LEFT], (0.0, 1.0, 0.0))
+    take.series.points[:, 7] = np.nan
+    moves = moving_in_the_hand([take])
+    assert moves is not None
+    assert np.flatnonzero(np.isnan(moves)).tolist() == [7]
+
+
 def test_what_only_noise_moves_tells_nothing() -> None:
     assert moving_in_the_hand([swung(SHEET[TOP_LEFT], (0.0, 0.0, 0.0))]) is None
 

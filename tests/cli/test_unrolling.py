@@ -40,6 +40,15 @@ def test_noise_moves_places_by_little_more_than_itself() -> None:
     assert np.sqrt(np.mean((distances(found) - distances(SHEET)) ** 2)) < 0.005
 
 
+def test_of_many_markers_some_are_unrolled_and_the_others_follow() -> None:
+    flat = np.array([[x, z] for z in np.linspace(0.0, 0.3, 30) for x in np.linspace(0.0, 0.4, 30)])
+    turn = flat[:, 0] / 0.15
+    found = unrolled(np.stack([0.15 * np.sin(turn), 0.15 * np.cos(turn), flat[:, 1]], axis=1))
+    assert found is not None
+    np.testing.assert_allclose(found.mean(axis=0), 0.0, atol=1e-9)
+    np.testing.assert_allclose(distances(found), distances(flat), atol=0.004)
+
+
 @pytest.mark.parametrize(
     "points",
     [

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from muslin.core.errors import InputError
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
+from muslin.core.refinement import refined
 from muslin.core.scenarios import preset
 from muslin.core.scenarios.laid import before_it_moves, laid_under
 from muslin.core.series import PointSeries
@@ -75,6 +76,17 @@ def test_a_sheet_whose_markers_are_not_in_a_plane_starts_bent(turn, shift, curva
         np.testing.assert_allclose(edges, 0.4 / (vertices[0] - 1), rtol=0.08)
         starts.append(start.reshape(vertices[1], vertices[0], 3))
     np.testing.assert_allclose(starts[1][::2, ::2], starts[0], atol=1e-9)
+    # carried along with the first gripper, and as much larger as the sheet is
+    shape = np.linalg.norm(start[:, None] - start[None], axis=2)
+    poses = laid.motion.poses + np.array([0.3, -0.2, 0.1, 0.0, 0.0, 0.0, 0.0])
+    poses[..., 3:] = [0.8, 0.0, 0.6, 0.0]
+    elsewhere = replace(laid, motion=Motion(laid.motion.times, poses)).start_vertices()
+    np.testing.assert_allclose(np.linalg.norm(elsewhere[:, None] - elsewhere[None], axis=2), shape, atol=1e-9)
+    larger = laid.start_vertices(scale=1.2)
+    np.testing.assert_allclose(np.linalg.norm(larger[:, None] - larger[None], axis=2), 1.2 * shape, atol=1e-9)
+    finer = refined(laid)
+    assert finer is not None
+    np.testing.assert_allclose(finer.start_vertices()[: len(start)], start, atol=1e-9)
 
 
 def test_what_is_lost_at_first_is_told_by_the_frames_before_a_gripper_moves() -> None:

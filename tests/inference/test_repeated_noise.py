@@ -1,5 +1,7 @@
 """Two takes of one motion tell the noise, and two that only share its name do not."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from muslin.core.arrays import FloatArray
 from muslin.core.measurement import Recording
 from muslin.core.motion import Motion
 from muslin.core.series import PointSeries
+from muslin.inference.noise import estimate_noise
 from muslin.inference.repeated_noise import noise_of_repeats
 
 
@@ -79,3 +82,14 @@ def test_takes_of_one_name_are_repeats_if_grippers_moved_alike(
     found = noise_of_repeats(one, carried("b", path(size), turned * turn, rng, told))
     assert found is not None and found.moved_alike == alike
     assert (np.sqrt(found.variance) == pytest.approx(0.003, rel=0.05)) == alike
+
+
+def test_a_study_takes_takes_that_only_share_a_name_for_no_repeats() -> None:
+    """Their roughness tells the noise then, and the fit says why; a third take that is a repeat is one."""
+    rng, turn = np.random.default_rng(9), 0.3 * np.sin(4 * TIME)
+    one, other, again = (carried(n, path(s), turn, rng, 0.0) for n, s in (("a", 0.1), ("b", 0.13), ("c", 0.1)))
+    for takes, said in (([one, other], "a and b are of one motion by their names"), ([one, other, again], "2 takes")):
+        problem = SimpleNamespace(recordings={r.name: r for r in takes}, clouds=[])
+        noise = estimate_noise(problem, None)  # type: ignore[arg-type]
+        assert said in noise.source
+        assert noise.sd == pytest.approx(0.003, rel=0.1)
