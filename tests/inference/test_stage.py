@@ -54,6 +54,25 @@ def test_a_search_leaves_simulations_for_telling_what_it_found(monkeypatch: pyte
     assert search.simulations == 400  # ... wherever they are told of
 
 
+def test_a_diagnosis_counts_what_its_fit_took(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(work, "offsets_of", lambda study: None)
+    left = SimpleNamespace(config=SimpleNamespace(diagnose=SimpleNamespace(draws=4, simulations=None)))
+    cloth = SimpleNamespace(body=SimpleNamespace(kind="cloth"))
+    problem = SimpleNamespace(
+        space=SimpleNamespace(to_unit=lambda samples: samples), pieces=1.0, fit_on=["a"], scenarios={"a": cloth}
+    )
+    limits = [
+        Work(
+            left,
+            problem,
+            SimpleNamespace(),
+            SimpleNamespace(samples=np.zeros((9, 1)), derivative_step=1e-3, simulations=n),
+        ).limit  # type: ignore[arg-type]
+        for n in (300, 780)
+    ]
+    assert limits == [int(0.85 * 880), int(0.85 * 672)]
+
+
 def bench(polished: Callable[..., Polished]) -> tuple[SimpleNamespace, _Tournament]:
     """Rollouts that run out, and a tournament of one candidate, whose fits are given."""
     drag = candidate("drag", 2 * COUNT)
