@@ -15,11 +15,11 @@ from ..measurement import Recording
 from ..motion import inverse, rotate
 from ..rest_shape import rolled_out
 from ..scenario import STANDARD_GRAVITY, Scenario
-from .measured import measured_start
+from .measured import in_motion, measured_start
 
 #: States of a rope are taken so far apart [s]: nearer ones show the same bends.
 _APART = 0.1
-#: So many frames after a state tell how it moves there.
+#: So many frames must follow a state.
 _FRAMES = 10
 _ANY = RopeMaterial(linear_density=1.0, stretch_stiffness=1.0, bending_rigidity=1.0)
 
@@ -72,7 +72,7 @@ def _states(scenario: Scenario, recording: Recording) -> list[Scenario]:
         rest = slice(found[0], None)
         cut = replace(recording, series=replace(series, time=series.time[rest], points=series.points[rest]))
         state = measured_start(replace(scenario, times=series.time[rest]), cut)
-        out.append(replace(state, beside=beside))
+        out.append(replace(in_motion(state, series), beside=beside))
     return out
 
 

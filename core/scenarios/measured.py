@@ -34,8 +34,10 @@ MEASURED_PIECE = 1.0
 
 #: Points between two markers at which the curve through them is measured.
 _FINE = 200
-#: Parabolas through the first frames go through so many at least, and through none later than this [s].
-_FEWEST, LONGEST = 5, 0.3
+#: Polynomials through the nearest frames, of this degree, go through so many at least: those of one side, of both.
+_ONE_SIDED, _TWO_SIDED = (2, 5), (3, 7)
+#: They go through none farther off than this [s].
+LONGEST = 0.3
 #: They fit where they leave no more than this times the noise.
 _WITHIN = 1.5
 #: Shapes before the start are so far apart [s].
@@ -48,8 +50,8 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
     In its rest shape it is straight and as long as the curve through the markers of the first frame (a natural cubic
     spline over the chords), along which every marker keeps its place. Length and so mass (at one linear density) are
     therefore those of this take: takes of one cable differ by as much as their markers are off. It is not given time to
-    settle, which would take it away from where it was seen, and starts with the velocity of its markers, told by
-    parabolas through their first frames: see :func:`first_motion`. Of markers that stand ``beside`` the axis all this
+    settle, which would take it away from where it was seen, and starts with the velocity of its markers in the first
+    frame: see :func:`motion_at`. Of markers that stand ``beside`` the axis all this
     is told of the places on the axis.
 
     Raises:
@@ -65,10 +67,7 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
             f"recording {recording.name!r}: every marker must be seen in the first frame, at least 3; start it later"
         )
     if beside is not None:
-        early = series.time - series.time[0] <= LONGEST
-        early[:_FEWEST] = True
-        time = series.time[early]
-        series = PointSeries(time, beside.axis(series.points[early], scenario.motion.at(time)))
+        series = _on_axis(series, float(series.time[0]), scenario, beside)
         points = series.points[0]
     curve, along, places = _curve(points)
     count = len(scenario.body.vertices)
@@ -83,49 +82,62 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
     evenly = np.linspace(0.0, along[-1], len(along))
     local = interpolate(evenly, along, local)
     start = GivenShape(local, along[-1], np.zeros(3))
-    motion = first_motion(series, places)
+    motion = motion_at(series, float(series.time[0]), places)
     return replace(scenario, body=body, start=start, markers=markers, settle=0.0, start_motion=motion, beside=beside)
 
 
 def with_earlier(scenario: Scenario, recording: Recording) -> Scenario:
-    """The scenario of a piece of a ``recording`` that starts as measured, with the shapes that the rope was in before.
+    """The scenario of a piece of a ``recording`` that starts as measured, with what was seen of the rope before.
 
-    Of the frames that show every marker, so many a second that it bends little from one to the next.
+    The shapes that it was in, of the frames that show every marker, so many a second that it bends little from one to
+    the next; and how it moves at the start, which frames before and after tell better than those after it alone.
     """
-    series = recording.series
+    series, start = recording.series, float(scenario.times[0])
     step = float(np.median(np.diff(series.time)))
-    seen = np.isfinite(series.points).all(axis=(1, 2)) & (series.time < scenario.times[0])
+    seen = np.isfinite(series.points).all(axis=(1, 2)) & (series.time < start)
     frames = np.flatnonzero(seen)[:: max(1, round(_EARLIER / step))]
     if not len(frames):
         return scenario
     points, count = series.points[frames], len(scenario.body.vertices)
+    near = series
     if scenario.beside is not None:
         points = scenario.beside.axis(points, scenario.motion.at(series.time[frames]))
+        near = _on_axis(series, start, scenario, scenario.beside)
     out = np.empty((len(points), count, 3))
     for k, curve in enumerate(curves(points)[0]):
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))])
         out[k] = interpolate(np.linspace(0.0, along[-1], count), along, curve)
-    return replace(scenario, earlier=out)
+    return in_motion(replace(scenario, earlier=out), near)
 
 
-def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
-    """Velocities and accelerations in the first frame, at places evenly along the rope.
+def in_motion(scenario: Scenario, series: PointSeries) -> Scenario:
+    """The scenario of a rope that moves at the start as places on its axis ``(T, P, 3)`` do before it and after it."""
+    start = float(scenario.times[0])
+    places = _curve(series.points[int(np.argmin(np.abs(series.time - start)))])[2]
+    return replace(scenario, start_motion=motion_at(series, start, places))
 
-    A parabola is fitted to the first frames of every marker, as many as one fits within the noise, by which it is told
-    in turn how far the first frames are from smooth; longer stretches are surer where noise is large. None where the
-    frames are too few to tell.
+
+def motion_at(series: PointSeries, time: float, places: FloatArray) -> StartMotion | None:
+    """Velocities and accelerations in the frame at ``time`` [s], at places evenly along the rope.
+
+    A polynomial is fitted to the nearest frames of every marker, as many as one fits within the noise, by which it is
+    told in turn how far they are from smooth; longer stretches are surer where noise is large. It is a cubic between
+    frames before and after, and a parabola at either end of a recording. None where the frames are too few to tell.
 
     Args:
         series: markers ``(T, P, 3)`` [m].
+        time: of one of its frames.
         places: of the markers along the rope ``(P,)`` [m].
     """
-    time = series.time - series.time[0]
-    most = int(np.searchsorted(time, LONGEST, side="right"))
-    points = series.points[: max(most, _FEWEST)]
-    noise = rough_sd([points])
+    off = series.time - time
+    degree, fewest = _TWO_SIDED if (off < 0.0).any() and (off > 0.0).any() else _ONE_SIDED
+    nearest = np.argsort(np.abs(off), kind="stable")
+    nearest = nearest[: max(int(np.sum(np.abs(off) <= LONGEST)), fewest)]
+    off, points = off[nearest], series.points[nearest]
+    noise = rough_sd([series.points[np.sort(nearest)]])
     best: FloatArray | None = None
-    for count in range(_FEWEST, len(points) + 1):
-        found, left = _parabolas(time[:count], points[:count])
+    for count in range(fewest, len(points) + 1):
+        found, left = _polynomials(off[:count], points[:count], degree)
         if best is not None and left > _WITHIN * noise:
             break
         best = found
@@ -139,20 +151,29 @@ def first_motion(series: PointSeries, places: FloatArray) -> StartMotion | None:
     return StartMotion(speed, change)
 
 
-def _parabolas(time: FloatArray, points: FloatArray) -> tuple[FloatArray, float]:
+def _on_axis(series: PointSeries, time: float, scenario: Scenario, beside: Beside) -> PointSeries:
+    """Places on the axis of markers that stand beside it, in all frames that tell the motion at ``time`` [s]."""
+    off = np.abs(series.time - time)
+    near = off <= max(LONGEST, float(np.sort(off)[: _TWO_SIDED[1]][-1]))
+    times = series.time[near]
+    return PointSeries(times, beside.axis(series.points[near], scenario.motion.at(times)))
+
+
+def _polynomials(time: FloatArray, points: FloatArray, degree: int) -> tuple[FloatArray, float]:
     """First and second derivatives ``(2, P, 3)`` at time zero, and the root mean square of what is left [m].
 
     NaN for markers that are seen in too few frames.
     """
     out, left = np.full((2, points.shape[1], 3), np.nan), []
+    scale = np.array([1.0, 1.0, 0.5, 1.0 / 6.0])[: degree + 1]
     for p in range(points.shape[1]):
         seen = np.isfinite(points[:, p]).all(axis=1)
-        if seen.sum() < _FEWEST:
+        if seen.sum() < degree + 3:
             continue
-        rows = np.stack([np.ones(seen.sum()), time[seen], 0.5 * time[seen] ** 2], axis=1)
+        rows = scale * np.vander(time[seen], degree + 1, increasing=True)
         solved = np.linalg.lstsq(rows, points[seen, p], rcond=None)[0]
-        out[:, p] = solved[1:]
-        left.append(np.sum((points[seen, p] - rows @ solved) ** 2) / (3 * (seen.sum() - 3)))
+        out[:, p] = solved[1:3]
+        left.append(np.sum((points[seen, p] - rows @ solved) ** 2) / (3 * (seen.sum() - degree - 1)))
     return out, float(np.sqrt(np.mean(left))) if left else 0.0
 
 

@@ -12,7 +12,7 @@ from muslin.core.motion import Motion
 from muslin.core.refinement import refined
 from muslin.core.scenario import Scenario
 from muslin.core.scenarios import preset
-from muslin.core.scenarios.measured import first_motion, measured_start
+from muslin.core.scenarios.measured import measured_start, motion_at, with_earlier
 from muslin.core.series import PointSeries
 
 TURN = np.array([np.cos(0.3), 0.0, np.sin(0.3), 0.0])
@@ -88,7 +88,7 @@ def test_it_starts_as_fast_as_its_markers(noise: float, slack: float) -> None:
     velocity = np.array([0.2, -0.5, 0.3]) * (1 + places[:, None])
     path = arc(places) + time[:, None, None] * velocity + 0.5 * time[:, None, None] ** 2 * np.array([0.0, 0.0, -2.0])
     path += np.random.default_rng(0).normal(0, noise, path.shape)
-    motion = first_motion(PointSeries(time, path), places - places[0])
+    motion = motion_at(PointSeries(time, path), 0.0, places - places[0])
     assert motion is not None
     speeds, changes = motion.along(9)
     assert np.abs(speeds - velocity).max() < slack
@@ -99,10 +99,52 @@ def test_a_marker_that_is_lost_at_first_moves_with_its_neighbours() -> None:
     places, time = np.linspace(-1.0, 1.0, 9), np.arange(0.0, 0.5, 0.01)
     path = arc(places) + time[:, None, None] * np.array([0.4, 0.0, 0.0])
     path[1:40, 3] = np.nan
-    motion = first_motion(PointSeries(time, path), places - places[0])
+    motion = motion_at(PointSeries(time, path), 0.0, places - places[0])
     assert motion is not None
     np.testing.assert_allclose(motion.velocities, np.tile([0.4, 0.0, 0.0], (len(motion.velocities), 1)), atol=1e-9)
 
 
 def test_two_frames_tell_no_velocity() -> None:
     assert measured_start(*recorded(arc(np.linspace(-1.0, 1.0, 9)))).start_motion is None
+
+
+def swung() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames of a rope that swings to and fro at 3 Hz, and the velocities and accelerations of its markers in them."""
+    places, time = np.linspace(-1.0, 1.0, 9), np.arange(0.0, 2.0, 0.01)
+    phase = 6.0 * np.pi * time[:, None, None] + places[:, None]
+    across = np.array([0.0, 0.04, 0.02]) * (1.0 - places[:, None] ** 2)
+    path = arc(places) + across * np.sin(phase)
+    path += np.random.default_rng(1).normal(0, 3e-5, path.shape)
+    return path, 6.0 * np.pi * across * np.cos(phase), -((6.0 * np.pi) ** 2) * across * np.sin(phase)
+
+
+def test_frames_before_and_after_tell_motion_better_than_those_after() -> None:
+    path, speeds, changes = swung()
+    time, along = np.arange(len(path)) * 0.01, np.linspace(0.0, 2.0, 9)
+    errors = []
+    for frame in range(20, 180, 7):
+        for first in (0, frame):
+            told = motion_at(PointSeries(time[first:], path[first:]), time[frame], along)
+            assert told is not None
+            speed, change = told.along(9)
+            errors.append([np.abs(speed - speeds[frame]).max(), np.abs(change - changes[frame]).max()])
+    both, after = np.reshape(errors, (-1, 2, 2)).max(axis=0)
+    assert (both < [0.02, 1.5]).all(), both  # of 0.75 m/s and 14 m/s2
+    assert (3.0 * both < after).all(), (both, after)
+
+
+def test_a_piece_starts_as_fast_as_the_whole_recording_tells() -> None:
+    path, speeds, _ = swung()
+    scenario, recording = recorded(path[0])
+    time = np.arange(len(path)) * 0.01
+    poses = np.stack([np.concatenate([path[:, k], np.tile(TURN, (len(path), 1))], axis=1) for k in (0, -1)], axis=1)
+    whole = replace(recording, series=PointSeries(time, path), motion=Motion(time, poses))
+    piece = replace(whole, series=PointSeries(time[87:], path[87:]))
+    alone = measured_start(scenario.for_recording(piece), piece)
+    made = with_earlier(alone, whole)
+    assert made.earlier is not None
+    assert made.start_motion is not None
+    assert alone.start_motion is not None
+    far = [np.abs(s.along(9)[0] - speeds[87]).max() for s in (made.start_motion, alone.start_motion)]
+    assert 2.0 * far[0] < far[1]
+    assert with_earlier(measured_start(scenario.for_recording(whole), whole), whole).earlier is None
