@@ -104,6 +104,22 @@ def test_what_twist_bends_is_no_bend_that_a_rope_keeps(turned: float) -> None:
     assert kept < 0.4 * without
 
 
+def test_a_straight_rope_that_swings_keeps_next_to_no_bend() -> None:
+    """By frames after each state alone its accelerations would be late, and 0.19 1/m would be told."""
+    poses = np.tile([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.7, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]], (len(TIME), 1, 1))
+    poses[:, 1, 1] += 0.06 * np.sin(2 * np.pi * TIME) ** 2
+    poses[:, 0, 2] += 0.04 * (1 - np.cos(2 * np.pi * TIME))
+    scenario = replace(preset("cable").scenario((1.0,), (41,)), motion=Motion(TIME, poses), times=TIME)
+    scenario = replace(scenario, markers=np.eye(41)[::2])
+    material = replace(MATERIAL, damping_time=0.02)
+    points = rollout(MujocoSimulator(time_step=0.00125), scenario, material).series.points
+    noise = np.random.default_rng(0).normal(0, 3e-5, points.shape)
+    swung = Recording("swung", PointSeries(TIME, points + noise), scenario.motion)
+    told = told_bend([measured_start(scenario.for_recording(swung), swung)], [swung])
+    assert told is not None
+    assert np.sqrt(np.mean(told.curvature(material, GRAVITY) ** 2)) < 0.14
+
+
 @pytest.mark.parametrize("turned", [1.0, 2.0])
 def test_an_even_bend_shows_as_clamps_turn_a_rope_though_no_state_tells_it(turned: float) -> None:
     """Of an arc between two clamps: how much it turns in all is given by them, so its energy does not depend on it."""
