@@ -51,8 +51,7 @@ def measured_start(scenario: Scenario, recording: Recording, beside: Beside | No
     spline over the chords), along which every marker keeps its place. Length and so mass (at one linear density) are
     therefore those of this take: takes of one cable differ by as much as their markers are off. It is not given time to
     settle, which would take it away from where it was seen, and starts with the velocity of its markers in the first
-    frame: see :func:`motion_at`. Of markers that stand ``beside`` the axis all this
-    is told of the places on the axis.
+    frame: see :func:`motion_at`. Of markers that stand ``beside`` the axis all this is told of the places on the axis.
 
     Raises:
         InputError: not a rope, not x, y and z in metres, or a marker is not seen in the first frame.
@@ -122,7 +121,7 @@ def motion_at(series: PointSeries, time: float, places: FloatArray) -> StartMoti
 
     A polynomial is fitted to the nearest frames of every marker, as many as one fits within the noise, by which it is
     told in turn how far they are from smooth; longer stretches are surer where noise is large. It is a cubic between
-    frames before and after, and a parabola at either end of a recording. None where the frames are too few to tell.
+    frames before and after, and a parabola at the ends of a recording and of a gap. None where frames are too few.
 
     Args:
         series: markers ``(T, P, 3)`` [m].
@@ -130,15 +129,17 @@ def motion_at(series: PointSeries, time: float, places: FloatArray) -> StartMoti
         places: of the markers along the rope ``(P,)`` [m].
     """
     off = series.time - time
-    degree, fewest = _TWO_SIDED if (off < 0.0).any() and (off > 0.0).any() else _ONE_SIDED
-    nearest = np.argsort(np.abs(off), kind="stable")
-    nearest = nearest[: max(int(np.sum(np.abs(off) <= LONGEST)), fewest)]
+    shown = np.flatnonzero(np.any(np.isfinite(series.points).all(axis=2), axis=1))
+    nearest = shown[np.argsort(np.abs(off[shown]), kind="stable")]
+    around = off[nearest[: _TWO_SIDED[1]]]
+    degree, fewest = _TWO_SIDED if (around < 0.0).any() and (around > 0.0).any() else _ONE_SIDED
+    nearest = nearest[: max(int(np.sum(np.abs(off[shown]) <= LONGEST)), fewest)]
     off, points = off[nearest], series.points[nearest]
     noise = rough_sd([series.points[np.sort(nearest)]])
     best: FloatArray | None = None
     for count in range(fewest, len(points) + 1):
         found, left = _polynomials(off[:count], points[:count], degree)
-        if best is not None and left > _WITHIN * noise:
+        if best is not None and np.isfinite(best).any() and left > _WITHIN * noise:
             break
         best = found
     if best is None:

@@ -108,14 +108,15 @@ def test_two_frames_tell_no_velocity() -> None:
     assert measured_start(*recorded(arc(np.linspace(-1.0, 1.0, 9)))).start_motion is None
 
 
-def swung() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Frames of a rope that swings to and fro at 3 Hz, and the velocities and accelerations of its markers in them."""
+def swung(rate: float = 3.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames of a rope that swings to and fro so often a second, its markers' velocities and accelerations in them."""
     places, time = np.linspace(-1.0, 1.0, 9), np.arange(0.0, 2.0, 0.01)
-    phase = 6.0 * np.pi * time[:, None, None] + places[:, None]
+    turn = 2.0 * np.pi * rate
+    phase = turn * time[:, None, None] + places[:, None]
     across = np.array([0.0, 0.04, 0.02]) * (1.0 - places[:, None] ** 2)
     path = arc(places) + across * np.sin(phase)
     path += np.random.default_rng(1).normal(0, 3e-5, path.shape)
-    return path, 6.0 * np.pi * across * np.cos(phase), -((6.0 * np.pi) ** 2) * across * np.sin(phase)
+    return path, turn * across * np.cos(phase), -(turn**2) * across * np.sin(phase)
 
 
 def test_frames_before_and_after_tell_motion_better_than_those_after() -> None:
@@ -148,3 +149,13 @@ def test_a_piece_starts_as_fast_as_the_whole_recording_tells() -> None:
     far = [np.abs(s.along(9)[0] - speeds[87]).max() for s in (made.start_motion, alone.start_motion)]
     assert 2.0 * far[0] < far[1]
     assert with_earlier(measured_start(scenario.for_recording(whole), whole), whole).earlier is None
+
+
+@pytest.mark.parametrize("lost", [3, 20])
+@pytest.mark.parametrize(("rate", "slack"), [(3.0, 0.06), (8.0, 0.6)])  # of 0.75 and 2 m/s
+def test_after_a_gap_the_frames_after_it_tell_how_fast(rate: float, slack: float, lost: int) -> None:
+    path, speeds, _ = swung(rate)
+    path[90 - lost : 90] = np.nan
+    told = motion_at(PointSeries(np.arange(len(path)) * 0.01, path), 0.9, np.linspace(0.0, 2.0, 9))
+    assert told is not None
+    assert np.abs(told.along(9)[0] - speeds[90]).max() < slack

@@ -105,7 +105,7 @@ def test_what_twist_bends_is_no_bend_that_a_rope_keeps(turned: float) -> None:
 
 
 def test_a_straight_rope_that_swings_keeps_next_to_no_bend() -> None:
-    """By frames after each state alone its accelerations would be late, and 0.19 1/m would be told."""
+    """By frames after each state alone its accelerations would be late, and a bend would be told of that."""
     poses = np.tile([[0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0], [0.7, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]], (len(TIME), 1, 1))
     poses[:, 1, 1] += 0.06 * np.sin(2 * np.pi * TIME) ** 2
     poses[:, 0, 2] += 0.04 * (1 - np.cos(2 * np.pi * TIME))
