@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import asdict
+from itertools import groupby
 from typing import Annotated
 
 import typer
@@ -27,12 +28,14 @@ def plugins(as_json: Annotated[bool, typer.Option("--json", help="Print JSON ins
     if as_json:
         say(json.dumps([asdict(r) for r in rows], indent=2))
         return
-    table = Table(box=None, pad_edge=False)
-    for heading in ("kind", "name", "distribution", "status"):
-        table.add_column(heading, no_wrap=heading != "status")
-    for row in rows:
-        # Text: a cause may hold square brackets, which are not markup
-        table.add_row(row.kind, row.name, row.distribution, Text(_status(row), "red" if row.error else "green"))
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for kind, its in groupby(rows, lambda row: row.kind):
+        table.add_row(Text(f"{kind}s" if kind in GROUPS else kind, "bold"))
+        for row in its:
+            # Text: a cause may hold square brackets, which are not markup
+            table.add_row(f"  {row.name}", Text(_told(row), "red" if row.error else ""))
     console = Console()
     if not console.is_terminal:
         console.width = 200
@@ -41,8 +44,10 @@ def plugins(as_json: Annotated[bool, typer.Option("--json", help="Print JSON ins
     say(f"{len(rows)} plugins, {broken} broken; check one with: muslin check NAME")
 
 
-def _status(row: PluginInfo) -> str:
-    return f"broken: {row.error}" if row.error else "ok"
+def _told(row: PluginInfo) -> str:
+    told = f"broken: {row.error}" if row.error else row.about
+    whose = "" if row.distribution.startswith("muslin ") else f"({row.distribution})"
+    return " ".join(filter(None, (told, whose)))
 
 
 def check(

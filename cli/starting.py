@@ -14,7 +14,7 @@ from ..core.importing.video import is_video
 from ..core.measurement import Measurement
 from ..core.measurement_store import load_measurement, read_found_by
 from ..core.registry import REGISTRY
-from ..core.scenarios import PRESETS, preset
+from ..core.scenarios import PRESETS, Preset, preset
 from ..core.store import write_text
 from ..core.study import Problem, build_problem, parse_config
 from ..core.study.choice import chosen
@@ -46,8 +46,8 @@ def new(
         Path, typer.Option(metavar="RECORDING.zarr", help="The measurement, made with muslin import.")
     ],
     scenario: Annotated[
-        str, typer.Option(metavar="NAME", help=f"The object and how it is held: {', '.join(PRESETS)}.")
-    ],
+        str, typer.Option(metavar="NAME", help=f"The object and how it is held: {', '.join(PRESETS)}. Needed.")
+    ] = "",
     simulator: Annotated[str, typer.Option(metavar="NAME", help="The engine; muslin plugins lists them.")] = "mujoco",
     estimator: Annotated[
         str, typer.Option(metavar="NAME", help="The posterior estimator; muslin plugins lists them.")
@@ -101,7 +101,7 @@ def new(
     force: Annotated[bool, typer.Option("--force", help="Replace a study file that is there already.")] = False,
 ) -> None:
     """Write a study file: what is fitted, on what, with which priors. Read it and change what you know better."""
-    base = preset(scenario)
+    base = _preset(scenario)
     for kind, name in (("simulator", simulator), ("estimator", estimator)):
         if name not in REGISTRY.names(kind):
             REGISTRY.get(kind, name)  # says what is installed, and which is nearest
@@ -200,6 +200,17 @@ def new(
     for remark in remarks:
         say(f"  {remark}")
     next_step(command("fit", study), note="look through the study file first")
+
+
+def _preset(name: str) -> Preset:
+    if name:
+        return preset(name)
+    width = max(map(len, PRESETS))
+    lines = "".join(f"\n  {known:{width}}  {its.about}" for known, its in PRESETS.items())
+    raise InputError(
+        "--scenario NAME is missing: what the object is and how it is held. How it moves is in the recording; sizes, "
+        f"grasps and what stands around it can be changed in the study file.{lines}"
+    )
 
 
 def _takes(

@@ -8,6 +8,7 @@ uses the group ``muslin`` instead, with a module that implements the hook of :mo
 
 import difflib
 import inspect
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -32,13 +33,14 @@ GROUPS = {
 
 @dataclass(frozen=True)
 class PluginInfo:
-    """One line of ``muslin plugins``: what is installed, by whom, and why it cannot be loaded if so."""
+    """One line of ``muslin plugins``: what is installed, by whom, what it is, and why it cannot be loaded if so."""
 
     kind: str
     name: str
     target: str
     distribution: str
     error: str = ""
+    about: str = ""
 
 
 class Registry:
@@ -118,12 +120,12 @@ class Registry:
                 entry = self._entries.get((kind, name))
                 target = entry.value if entry else f"{self._objects[kind, name]!r}"
                 owner = _owner(entry) if entry else "this process"
-                error = ""
+                error = about = ""
                 try:
-                    self.get(kind, name)
+                    about = _about(self.get(kind, name))
                 except BrokenPluginError as broken:
                     error = _cause(broken.__cause__ or broken) + _advice(broken.__cause__)
-                rows.append(PluginInfo(kind, name, target, owner, error))
+                rows.append(PluginInfo(kind, name, target, owner, error, about))
         return rows + self._hook_errors
 
 
@@ -134,6 +136,12 @@ def _check_kind(kind: str) -> None:
 
 def _owner(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown distribution"
+
+
+def _about(plugin: Any) -> str:
+    """The first sentence of its docstring."""
+    first = " ".join((inspect.getdoc(plugin) or "").split("\n\n")[0].split())
+    return re.split(r"(?<=\.) ", first)[0].replace("``", "").rstrip(".")
 
 
 def _cause(error: BaseException) -> str:

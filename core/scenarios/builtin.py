@@ -44,22 +44,38 @@ def _always(motion: Callable[[], Motion]) -> Callable[[Body], Motion]:
 
 
 def _in_the_air(
-    name: str, motion: Callable[[], Motion], holds: Callable[[Body], tuple[IntArray, ...]], settle: float = 0.5
+    name: str,
+    about: str,
+    motion: Callable[[], Motion],
+    holds: Callable[[Body], tuple[IntArray, ...]],
+    settle: float = 0.5,
 ) -> Preset:
-    return Preset(name, ("cloth", "rope"), (0.3, 0.3), (9, 9), _always(motion), holds, layouts.hanging, settle=settle)
+    kinds, path = ("cloth", "rope"), _always(motion)
+    return Preset(name, about, kinds, (0.3, 0.3), (9, 9), path, holds, layouts.hanging, settle=settle)
 
 
 PRESETS: dict[str, Preset] = {
     p.name: p
     for p in (
-        _in_the_air("fling", motions.fling_motion, grasps.top_corners),
-        _in_the_air("swing", motions.swing_motion, grasps.top_corners),
-        _in_the_air("lift", motions.lift_motion, grasps.top_corners),
-        _in_the_air("hang", motions.still_motion, grasps.top_corners, settle=0.0),
-        _in_the_air("carry", motions.carry_motion, grasps.top_edge),
-        _in_the_air("drop", motions.still_motion, grasps.nothing_held, settle=0.0),
+        _in_the_air(
+            "fling",
+            "cloth by its top corners, or rope by one end, in the air: flung up and forward",
+            motions.fling_motion,
+            grasps.top_corners,
+        ),
+        _in_the_air("swing", "the same, swung to and fro", motions.swing_motion, grasps.top_corners),
+        _in_the_air("lift", "the same, lifted", motions.lift_motion, grasps.top_corners),
+        _in_the_air("hang", "the same, held still", motions.still_motion, grasps.top_corners, settle=0.0),
+        _in_the_air(
+            "carry",
+            "cloth by its top edge, or rope by one end, in the air: carried elsewhere",
+            motions.carry_motion,
+            grasps.top_edge,
+        ),
+        _in_the_air("drop", "cloth or rope that nobody holds", motions.still_motion, grasps.nothing_held, settle=0.0),
         Preset(
             "fold",
+            "cloth that lies on a table, folded over by two corners",
             ("cloth",),
             (0.3, 0.3),
             (9, 9),
@@ -71,6 +87,7 @@ PRESETS: dict[str, Preset] = {
         ),
         Preset(
             "wiping",
+            "cloth that lies on a table, drawn over it by the middle of an edge",
             ("cloth",),
             (0.3, 0.3),
             (9, 9),
@@ -84,6 +101,7 @@ PRESETS: dict[str, Preset] = {
         ),
         Preset(
             "cable",
+            "rope in the air, clamped at both ends by two grippers",
             ("rope",),
             (1.0,),
             (41,),
@@ -95,6 +113,7 @@ PRESETS: dict[str, Preset] = {
         ),
         Preset(
             "winding",
+            "rope clamped at one end and wound onto a spool",
             ("rope",),
             (1.0,),
             (51,),
@@ -109,6 +128,7 @@ PRESETS: dict[str, Preset] = {
         ),
         Preset(
             "beam",
+            "soft solid, clamped at one end",
             ("solid",),
             (0.03, 0.10, 0.03),
             (3, 7, 3),

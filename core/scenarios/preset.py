@@ -29,6 +29,7 @@ class Preset:
 
     Args:
         name: of the scenario.
+        about: what it is, for a person, in a few words.
         kinds: of body that it can be done with; the first is meant where nothing else is said.
         size: of that body, as in :data:`SIZES` [m].
         vertices: counts along the same axes (cloth: columns, rows).
@@ -44,6 +45,7 @@ class Preset:
     """
 
     name: str
+    about: str
     kinds: tuple[str, ...]
     size: Size
     vertices: Counts

@@ -20,7 +20,7 @@ CYLINDER_DRAG = 1.1
 
 
 class AirDrag(Effect):
-    """Drag and lift of still air, per triangle: see :func:`~.surface.plate_force`.
+    """Drag and lift of still air, per triangle. See :func:`~.surface.plate_force`.
 
     C_D of a plate is 1.1 to 1.3, less if the cloth is porous. The power is that of the drag alone, never
     positive; with C_L above C_D the air would still push a triangle forward along its own plane.
@@ -49,7 +49,7 @@ class AirDrag(Effect):
 
 
 class CylinderDrag(Effect):
-    """Drag of still air on a rope, per segment: see :func:`~.line.cylinder_force`.
+    """Drag of still air on a rope, per segment. See :func:`~.line.cylinder_force`.
 
     C_D across is 1.0 to 1.2 for a smooth cylinder (Hoerner 1965, Fluid-Dynamic Drag, ch. 3). C_f along is that
     of a laminar boundary layer on the wetted surface, 1.33 / sqrt(Re) or about 0.005 for a metre of rope at

@@ -14,6 +14,7 @@ from muslin.cli.main import run
 from muslin.core.errors import InputError
 from muslin.core.measurement_store import load_measurement, save_measurement
 from muslin.core.registry import REGISTRY
+from muslin.core.scenarios import PRESETS
 from muslin.core.study import Study, build_problem, read_config
 
 
@@ -246,7 +247,27 @@ def test_new_refuses_what_cannot_be(tmp_path: Path, capsys: pytest.CaptureFixtur
     ):
         assert status(*base, *arguments) == 2
         assert words in capsys.readouterr().err
+    assert status(*base[:-1]) == 2
+    told = capsys.readouterr().err
+    assert "--scenario NAME is missing" in told
+    for name, its in PRESETS.items():
+        assert f"  {name:7}  {its.about}\n" in told
     assert not (tmp_path / "s.toml").exists()
+
+
+class Hollow:
+    """Finds nothing."""
+
+
+def test_plugins_says_what_each_is_and_of_others_whose(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(REGISTRY._objects, ("extractor", "hollow"), Hollow)
+    assert status("plugins") == 0
+    lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert "wind Steady horizontal wind: what moving air does beyond still air" in lines
+    assert "hollow Finds nothing (this process)" in lines
+    assert lines.index("extractors") < lines.index("effects")
 
 
 def test_plugins_as_json(capsys: pytest.CaptureFixture[str]) -> None:

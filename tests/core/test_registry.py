@@ -37,6 +37,15 @@ def test_installed_plugins_are_found_and_loaded_when_asked(install: Install) -> 
     assert registry.get("effect", "gust").__name__ == "Gust"
 
 
+def test_the_first_sentence_of_its_docstring_says_what_a_plugin_is(install: Install) -> None:
+    words = "A ``gust``\n    that comes, at 1.5 m/s. See :mod:`.air`.\n\n    Not more."
+    text = f'class Gust:\n    """{words}"""\nclass Bare:\n    pass\n'
+    install("gusts", "[muslin.effects]\ngust = gusts_two:Gust\nbare = gusts_two:Bare\n", gusts_two=text)
+    rows = {row.name: row for row in Registry().inventory()}
+    assert rows["gust"].about == "A gust that comes, at 1.5 m/s"
+    assert rows["bare"].about == ""
+
+
 def test_unknown_names_are_answered_with_the_nearest() -> None:
     with pytest.raises(UnknownPluginError, match=r"Did you mean 'air-drag'.*Installed:.*wind"):
         Registry().get("effect", "air-darg")
