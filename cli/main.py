@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Annotated, NoReturn
 
 import typer
-from threadpoolctl import threadpool_limits
 
+from ..core.threads import one_thread
 from ..core.version import __version__
 from . import (
     annotate,
@@ -92,9 +92,7 @@ def run(arguments: Sequence[str] | None = None) -> NoReturn:
     debug = "--debug" in given or os.environ.get("MUSLIN_DEBUG", "") not in ("", "0")
     given = [a for a in given if a != "--debug"] or ["--help"]
     try:
-        # numpy's matrices are small here, and threads that wait for a busy core take longer than the work; torch, which
-        # is loaded later and has threads of its own, is left as it is
-        with threadpool_limits(1, user_api="blas"):
+        with one_thread():
             status = app(args=given, prog_name="muslin", standalone_mode=False)
         sys.stdout.flush()
     except (KeyboardInterrupt, typer.Abort):

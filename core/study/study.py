@@ -14,6 +14,7 @@ from ..measurement import Measurement, Recording, repeats
 from ..measurement_store import load_measurement
 from ..registry import REGISTRY
 from ..store import damage_errors, new_store, open_store, storage_errors
+from ..threads import one_thread
 from .config import ParameterTable, StudyConfig, read_config, write_config
 from .pool import SimulationPool
 from .problem import Problem, build_problem
@@ -86,7 +87,8 @@ class Study:
 
     @cached_property
     def problem(self) -> Problem:
-        return build_problem(self.config, self.measurement, self.path.parent)
+        with one_thread():
+            return build_problem(self.config, self.measurement, self.path.parent)
 
     def pool(self, problem: Problem | None = None) -> SimulationPool:
         problem = problem or self.problem
@@ -164,33 +166,38 @@ class Study:
             )
         return group
 
+    def _step(self, name: str, *given: Any, **options: Any) -> Any:
+        step = REGISTRY.get("step", name)  # brings its libraries, which the limit is to hold for
+        with one_thread():
+            return step(self, *given, **options)
+
     def fit(self) -> Any:
         """Fit; see the step ``fit``. Continues from the draws of an interrupted run."""
-        return REGISTRY.get("step", "fit")(self)
+        return self._step("fit")
 
     def compare(self) -> Any:
         """Hold the fitted model against every recording; see the step ``compare``."""
-        return REGISTRY.get("step", "compare")(self)
+        return self._step("compare")
 
     def diagnose(self) -> Any:
         """Say which effect is missing; see the step ``diagnose``."""
-        return REGISTRY.get("step", "diagnose")(self)
+        return self._step("diagnose")
 
     def next_experiment(self, **options: Any) -> Any:
         """Propose the motion that settles what the diagnosis left open; see the step ``next``."""
-        return REGISTRY.get("step", "next")(self, **options)
+        return self._step("next", **options)
 
     def unknown(self) -> Any:
         """Estimate the force that the model lacks, and the law that it follows; see the step ``unknown``."""
-        return REGISTRY.get("step", "unknown")(self)
+        return self._step("unknown")
 
     def calibrate(self, *, simulations: int = 0, predictive: int = 100) -> Any:
         """Say whether the posterior can be believed; see the step ``calibrate``."""
-        return REGISTRY.get("step", "calibrate")(self, simulations=simulations, predictive=predictive)
+        return self._step("calibrate", simulations=simulations, predictive=predictive)
 
     def export(self, kind: str, path: str | Path, **options: Any) -> None:
         """Write the posterior for other programs; see the step ``export``."""
-        REGISTRY.get("step", "export")(self, kind, Path(path), **options)
+        self._step("export", kind, Path(path), **options)
 
     def add(
         self,
