@@ -1,6 +1,7 @@
 """The object at its worst moment: the predicted mesh coloured by error, and where the points really were."""
 
 from dataclasses import dataclass, field, replace
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,6 +22,8 @@ _PALE = 8.0
 _EDGE = (0.12, 0.15, 0.18, 0.28)
 #: Of the picture's height: so wide it is at least, that titles fit; an object smaller than this is drawn as points.
 _NARROWEST, _SPECK = 0.6, 0.02
+#: Letters of a line of a title, as many as fit over a picture.
+_WIDEST = 44
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,8 +215,9 @@ def add_snapshots(figure: FigureBase, spots: list[Axes], shots: list[Snapshot], 
         axes.set_aspect("equal")
         bare(axes)
         far = shot.distances()
-        away = f": points {plain(float(np.sqrt(np.mean(far**2))) * factor)} {label} away" if len(far) else ""
-        axes.set_title(f"{shot.title}{away}", fontsize=9.5, color=INK)
+        away = f"points {plain(float(np.sqrt(np.mean(far**2))) * factor)} {label} away" if len(far) else ""
+        between = ":\n" if len(shot.title + away) > _WIDEST else ": "
+        axes.set_title(between.join(filter(None, (fill(shot.title, _WIDEST), away))), fontsize=9.5, color=INK)
     _scale_bar(spots[0], low, high, factor, label)
     drawn = figure.colorbar(
         ScalarMappable(Normalize(0.0, top * factor), ERROR_MAP), ax=spots, shrink=0.7, aspect=28, pad=0.02

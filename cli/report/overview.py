@@ -1,6 +1,7 @@
 """One wide picture of a whole study, for a README."""
 
 from textwrap import fill
+from typing import Any
 
 from ...core.errors import StepMissingError
 from ...core.study.study import Study
@@ -31,13 +32,16 @@ def draw_overview(study: Study, after: Study | None = None) -> bytes:
         axes = left.add_subplot()
         draw_error(axes, take, error_ceiling([take]))
         held = ", held out" if take.held_out else ""
-        axes.set_title(f"recording {take.name}{held}", loc="left", color=INK, fontsize=10)
-        white = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+        axes.set_title(f"recording {take.name}{held}", loc="left", color=INK, fontsize=10, pad=19)
         key = [("fitted model", BEFORE), (f"with {name}", AFTER)][: 2 if take.after is not None else 1]
-        for i, (label, colour) in enumerate([*key, ("grey: noise", "#8b8d8a")]):
-            axes.text(
-                0.015, 0.97 - 0.065 * i, label, color=colour, transform=axes.transAxes, fontsize=9, va="top", bbox=white
-            )
+        style: dict[str, Any] = {"fontsize": 9, "va": "bottom", "textcoords": "offset points"}
+        beside: Any = axes.transAxes  # the first stands on the axes, every other to the right of the one before
+        at, gap = (0.0, 1.0), (0.0, 4.0)
+        shades = [("grey: noise", "#8b8d8a"), ("pale: posterior", "#b98a6b")][: 2 if take.scatter is not None else 1]
+        for label, colour in [*key, *shades]:
+            beside = axes.annotate(label, at, gap, xycoords=beside, color=colour, **style)
+            beside.set_in_layout(False)  # or a long row makes the axes narrow
+            at, gap = (1.0, 0.0), (12.0, 0.0)
         shots = snapshots(take, name)
         if shots:
             spots = list(right.subplots(1, len(shots), squeeze=False)[0])
