@@ -21,25 +21,34 @@ from .held_out import HeldOut, held_out_residuals
 from .numerics import numerics
 from .verdict import Evidence
 
-#: Share of the simulations that the search leaves: for what it has begun when they end, and for telling what it found.
+#: Share of the usual simulations that the search leaves: for what it has begun when they end, and for telling what it
+#: found, which does not get less where the search gets fewer.
 RESERVED = 0.15
 #: Simulations of a diagnosis for every recording that is fitted, and at least, by kind of object; ropes are quick.
 A_RECORDING = {"rope": 1250, "cloth": 440, "solid": 500}
 AT_LEAST = {"rope": 1250, "cloth": 880, "solid": 1000}
 #: So many times that for the fit and the diagnosis together: a fit that took more leaves less, down to this share.
-TOGETHER, FEWEST = 1.65, 0.75
+TOGETHER, FEWEST = 1.62, 0.5
 #: Share of what the search has that is kept for pairs, where no effect alone is the answer.
 PAIRED = 0.15
 #: Least-squares evaluations of the model that is told of, beside a user's own fit.
 USER_EVALUATIONS = 8
 
 
-def usual_simulations(problem: Problem, fitted: int) -> int:
-    """How many simulations a diagnosis may take where the study does not say, after a fit that took ``fitted``."""
+def search_simulations(problem: Problem, fitted: int, asked: int | None = None) -> int:
+    """How many simulations the search of a diagnosis may take.
+
+    Args:
+        problem: what is diagnosed.
+        fitted: simulations that its fit took.
+        asked: for the whole diagnosis, if the study says.
+    """
+    if asked is not None:
+        return round((1.0 - RESERVED) * asked)
     name = problem.fit_on[0]
     kind = problem.scenarios[name].body.kind
     usual = max(AT_LEAST[kind], round(A_RECORDING[kind] * len(problem.fit_on) / problem.pieces))
-    return round(min(usual, max(TOGETHER * usual - fitted, FEWEST * usual)))
+    return round(min(usual, max(TOGETHER * usual - fitted, FEWEST * usual)) - RESERVED * usual)
 
 
 class Work:
@@ -60,8 +69,8 @@ class Work:
         self.study, self.problem, self.pool, self.fit = study, problem, pool, fit
         self.offsets = offsets_of(study)
         self.starts = problem.space.to_unit(fit.samples)[: 4 * study.config.diagnose.draws]
-        asked = study.config.diagnose.simulations or usual_simulations(problem, fit.simulations)
-        self.limit = int((1 - RESERVED) * asked * problem.pieces)
+        asked = study.config.diagnose.simulations
+        self.limit = round(search_simulations(problem, fit.simulations, asked) * problem.pieces)
         self.cut_short = False
         self.discrepancy = Discrepancy(step=fit.derivative_step)
         self.rough = Roughness({}, {}, {})
