@@ -265,7 +265,7 @@ def test_plugins_says_what_each_is_and_of_others_whose(
     monkeypatch.setitem(REGISTRY._objects, ("extractor", "hollow"), Hollow)
     assert status("plugins") == 0
     lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert "wind Steady horizontal wind: what moving air does beyond still air" in lines
+    assert "cylinder-drag Drag of still air on a rope, per segment [rope]" in lines
     assert "hollow Finds nothing (this process)" in lines
     assert lines.index("extractors") < lines.index("effects")
 
