@@ -9,6 +9,7 @@ Held out is a motion of a type that was never fitted. See ``effects_bench/cases.
 
     make bench-effects                                     # as many development cases as 60 minutes allow
     make bench-effects EFFECTS="--part test --cases 400"   # on seeds that nothing was improved on
+    make bench-effects EFFECTS="--first-seed 1020010 --seeds 1020014 --output again.json"   # a case by itself
 
 Cases come in an order of which any first part is a fair share. A run that is stopped goes on where it was: finished
 cases and the answers of baselines are kept in ``OUTPUT.cells.partial``, unless muslin or what makes them has changed.
@@ -20,6 +21,7 @@ import itertools
 import json
 import os
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--part", choices=list(FIRST_SEEDS), default="development", help="which seeds")
     parser.add_argument("--first-seed", type=int, help="of an earlier batch, to make it again (default: the part's)")
     parser.add_argument("--cases", type=int, default=100, help="how many (default: 100)")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[], help="cases of that batch, these alone")
     parser.add_argument("--minutes", type=float, default=60.0, help="start no case after (default: 60)")
     parser.add_argument("--settings", nargs="*", choices=list(SETTINGS), default=list(SETTINGS), help="these alone")
     parser.add_argument("--kinds", nargs="*", choices=list(BLOCK), default=list(BLOCK), help="of truth, these alone")
@@ -45,15 +48,21 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--draws", type=int, default=500, help="that amortised baselines learn from, a setting")
     parser.add_argument("--at-once", type=int, default=2, help="cases that run beside one another (default: 2)")
     parser.add_argument("--workers", type=int, default=1, help="processes of each study (default: 1)")
-    parser.add_argument("--output", type=Path, default=RESULTS / "effects.json")
+    batch = RESULTS / "effects.json"
+    parser.add_argument("--output", type=Path, default=batch)
     told = parser.parse_args()
     told.first_seed = FIRST_SEEDS[told.part] if told.first_seed is None else told.first_seed
+    if told.seeds and told.output == batch:
+        parser.error(f"--seeds needs an --output of its own: {batch} is for whole batches")
+    if told.seeds and min(told.seeds) < told.first_seed:
+        parser.error(f"the batch begins with --first-seed {told.first_seed}, after --seeds {min(told.seeds)}")
     return told
 
 
-def chosen(first_seed: int, count: int, settings: list[str], kinds: list[str]) -> list[Case]:
-    """The first cases from a seed on that are of these settings and kinds."""
-    cases = (c for c in plan(first_seed) if c.setting in settings and c.kind in kinds)
+def chosen(first_seed: int, count: int, settings: list[str], kinds: list[str], seeds: Sequence[int] = ()) -> list[Case]:
+    """The first cases from a seed on that are of these settings and kinds; if any ``seeds`` are given, of these."""
+    whole = itertools.takewhile(lambda c: not seeds or c.seed <= max(seeds), plan(first_seed))
+    cases = (c for c in whole if c.setting in settings and c.kind in kinds and (not seeds or c.seed in seeds))
     return list(itertools.islice(cases, count))
 
 
@@ -61,7 +70,7 @@ def main() -> None:
     a = parsed()
     a.output.parent.mkdir(parents=True, exist_ok=True)
     found, deadline = {}, time.monotonic() + 60 * a.minutes
-    cases = chosen(a.first_seed, a.cases, a.settings, a.kinds)
+    cases = chosen(a.first_seed, a.cases, a.settings, a.kinds, a.seeds)
     kept, cache = (a.output.with_suffix(f".{what}.partial") for what in ("cells", "draws"))
     run = Run(kept, cache, a.workers, tuple(a.baselines), a.draws)
     for number, record in run.finished(cases, a.at_once, deadline):

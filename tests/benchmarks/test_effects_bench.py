@@ -181,6 +181,12 @@ def test_chosen_settings_and_kinds_keep_the_order_of_the_plan() -> None:
     )
 
 
+def test_a_case_by_itself_is_what_it_is_in_its_batch() -> None:
+    batch = first("development", 9)
+    start = FIRST_SEEDS["development"]
+    assert chosen(start, 100, list(SETTINGS), list(BLOCK), [start + 8, start + 2]) == [batch[2], batch[8]]
+
+
 # --- going on after a kill -----------------------------------------------------------------------------------------
 
 
