@@ -4,11 +4,13 @@ import base64
 import json
 import re
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from made_up_study import ROLES, make_study
+from matplotlib.figure import Figure
 from report_page import Page, page_of
 
 from muslin.cli import steps
@@ -206,6 +208,21 @@ def test_overview_picture(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     with pytest.raises(StepMissingError, match="muslin compare"):
         overview_figure(make_study(tmp_path / "b", "fit"))
+
+
+def test_what_names_the_colours_of_the_overview_stands_above_the_curves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr("muslin.cli.report.overview.png", lambda figure, dots: drawn.append(figure))
+    overview_figure(make_study(tmp_path, "fit", "compare", "diagnose"))
+    drawn[0].draw_without_rendering()
+    axes = drawn[0].axes[0]
+    key = [t for t in axes.texts if not t.get_text().startswith("worst")]
+    assert {"fitted model", "grey: noise"} <= {t.get_text() for t in key}
+    boxes = [t.get_window_extent() for t in key]
+    assert all(box.y0 >= axes.bbox.y1 for box in boxes)
+    assert all(a.x1 < b.x0 for a, b in pairwise(boxes))
 
 
 @pytest.mark.parametrize("axes", [slice(0, 2), slice(0, 3)])

@@ -1,12 +1,13 @@
 """The object at its worst moment: what is drawn of it, and how far away its points are said to be."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from muslin.cli.report.figures_object import Snapshot, camera, draw_snapshot, window
+from muslin.cli.report.figures_object import Snapshot, add_snapshots, camera, draw_snapshot, window
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -40,3 +41,13 @@ def test_what_is_too_small_to_see_is_drawn_as_points_too() -> None:
         before = len(axes.collections)
         draw_snapshot(axes, SHOT, Normalize(0, 1), camera(-0.5 * np.pi, 0.0), speck)
         assert len(axes.collections) - before == 4 + more  # outlines, mesh, pairs, measured
+
+
+def test_a_long_title_takes_lines_instead_of_running_into_the_scale() -> None:
+    figure = Figure()
+    shots = [replace(SHOT, title=title) for title in ("fitted model", "with viscous damping, grasp compliance, wind")]
+    spots = list(figure.subplots(1, 2))
+    add_snapshots(figure, spots, shots, SimpleNamespace(unit="m", noise=0.003))  # type: ignore[arg-type]
+    short, long = (axes.get_title() for axes in spots)
+    assert short == "fitted model: points 500 mm away"
+    assert long == "with viscous damping, grasp compliance, wind:\npoints 500 mm away"

@@ -30,6 +30,12 @@ def test_a_command_takes_one_thread_of_linear_algebra(monkeypatch: pytest.Monkey
     assert seen == {1}
 
 
+def test_a_study_is_loaded_by_one_thread_of_linear_algebra(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("muslin.core.study.study.build_problem", lambda *_: blas_threads())
+    with threadpool_limits(2, user_api="blas"):
+        assert Study.load(study).problem == {1}
+
+
 def test_a_step_takes_one_thread_of_linear_algebra(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(REGISTRY._objects, ("step", "fit"), lambda study: blas_threads())
     with threadpool_limits(2, user_api="blas"):
