@@ -47,7 +47,7 @@ def plugins(as_json: Annotated[bool, typer.Option("--json", help="Print JSON ins
 def _told(row: PluginInfo) -> str:
     told = f"broken: {row.error}" if row.error else row.about
     plugin = REGISTRY.get("effect", row.name) if row.kind == "effect" and not row.error else None
-    kinds = sorted(getattr(plugin, "object_kinds", ()))  # what is no effect at all is for muslin check to say
+    kinds = sorted(getattr(plugin, "object_kinds", None) or ())  # what is no effect at all is for muslin check to say
     acts = f"[{', '.join(kinds)}]" if kinds else ""
     whose = "" if row.distribution.startswith("muslin ") else f"({row.distribution})"
     return " ".join(filter(None, (told, acts, whose)))
