@@ -8,7 +8,6 @@ import numpy as np
 from .arrays import FloatArray
 from .bending import RopeBending
 from .body import Body
-from .motion import rotate
 
 #: Turns at a vertex that are not worth telling from rounding [rad].
 _STRAIGHT = 1e-7
@@ -26,14 +25,21 @@ def rolled_out(
         turns: from segment to segment, in that frame ``(V - 2, 2)`` [rad].
         lengths: of the segments ``(V - 1,)`` [m].
     """
-    steps = [along]
-    for turn in turns:
-        axis = turn @ frame
-        angle = float(np.linalg.norm(axis))
-        if angle > 0:
-            quaternion = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * axis / angle])
-            frame, along = rotate(quaternion, frame), rotate(quaternion, along)
-        steps.append(along)
+    angles = np.linalg.norm(turns, axis=1)
+    across = turns / np.where(angles > 0.0, angles, 1.0)[:, None]
+    # what turns the axes (along, frame) by these angles about those vectors, told in the same axes (Rodrigues)
+    axis = np.concatenate([np.zeros((len(turns), 1)), across], axis=1)
+    cosine = np.cos(angles)[:, None, None]
+    made = cosine * np.eye(3) + (1.0 - cosine) * axis[:, :, None] * axis[:, None, :]
+    sideways = np.sin(angles)[:, None] * np.stack([across[:, 1], -across[:, 0]], axis=1)
+    made[:, 0, 1:] -= sideways
+    made[:, 1:, 0] += sideways
+    axes = np.column_stack([along, *frame])
+    steps = np.empty((len(turns) + 1, 3))
+    steps[0] = along
+    for k, turn in enumerate(made):
+        axes = axes @ turn
+        steps[k + 1] = axes[:, 0]
     return np.asarray(first + np.concatenate([np.zeros((1, 3)), np.cumsum(steps * lengths[:, None], axis=0)]))
 
 

@@ -5,11 +5,9 @@ triangle for every segment, from its two ends to one common fixed point, of whic
 segment is elastic. So it has the implicit treatment, the geometric stiffness and the damping of a membrane.
 """
 
-from itertools import pairwise
-
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray, IntArray, cross, dot
 from ...core.bending import RopeBending
 from ...core.body import Body
 from ...core.clamps import clamped_segments
@@ -149,15 +147,16 @@ def start_twists(body: Body, held: IntArray, twist: float) -> FloatArray:
 
 def _curvatures(tangents: FloatArray, u: FloatArray) -> FloatArray:
     """Curvature binormals ``(V - 2, 2)`` in a frame that goes along without twist from ``u (3,)``."""
-    out = np.empty((len(tangents) - 1, 2))
-    for k, (a, b) in enumerate(pairwise(tangents)):
-        binormal = 2.0 * np.cross(a, b) / (1.0 + a @ b)
-        out[k] = binormal @ u, binormal @ np.cross(a, u)
-        u = _carried(u, a, b)
-    return out
+    before, behind = tangents[:-1], tangents[1:]
+    turned, steep = cross(before, behind), 1.0 + dot(before, behind)
+    across = np.empty_like(before)
+    for k, (both, share) in enumerate(zip(before + behind, steep.tolist(), strict=True)):
+        across[k] = u
+        u = u - (behind[k] @ u) / share * both
+    binormals = 2.0 * turned / steep[:, None]
+    return np.stack([dot(binormals, across), dot(binormals, cross(before, across))], axis=1)
 
 
 def _carried(u: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    """``u`` after the shortest turn from direction ``a`` to ``b``."""
-    binormal, cosine = np.cross(a, b), a @ b
-    return np.asarray(u * cosine + np.cross(binormal, u) + binormal * (binormal @ u) / (1.0 + cosine))
+    """``u``, across ``a``, after the shortest turn from direction ``a`` to ``b``."""
+    return np.asarray(u - (b @ u) / (1.0 + a @ b) * (a + b))
