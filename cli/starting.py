@@ -20,7 +20,7 @@ from ..core.study import Problem, build_problem, parse_config
 from ..core.study.choice import chosen
 from ..core.study.objects import grasps_of, keep_points, object_of
 from .clamping import clamped
-from .console import command, next_step, say
+from .console import ProgressView, command, next_step, say
 from .doubtful import doubtful_starts
 from .holding import held_as_seen
 from .output import check_output
@@ -136,6 +136,8 @@ def new(
     if lies is not None:
         table["obstacles"] = [{"kind": "table", "height": lies.height, "friction": lies.friction}]
         remarks.append(f"it starts flat at {lies.height:g} m: the table is there ([scenario] obstacles)")
+    # a line, not a bar: what comes next is told by remarks
+    ProgressView()("looking at how the object lies in the recordings", 0, 0)
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
     shown = Shown() if placed or mesh or extractor else shown_by_markers(whole, measured, study, sizes)
