@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..core.study import SimulationPool, Task
 from .discrepancy import NONE, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, failed, residual
-from .secants import CHANCE, LARGEST, Found, search
+from .secants import CHANCE, LARGEST, LITTLE, Found, search
 
 #: Least squares starts from another place while it leaves this times what noise leaves, this often at most, from
 #: starts at least so far from places known in some coordinate of the unit cube. A wrong valley may leave little more.
@@ -182,22 +183,22 @@ def polish(
     count, least = objective.count(white), objective.discrepancy.step
     enough, coarse = TOLD_APART / count, max(least, COARSE)
     at = Found(start, white, np.zeros((len(white), len(start))) if known is None else known)
-    best, used, smooth = search(objective.many, at, evaluations, enough=enough, least=coarse, known=known is not None)
+    seek = partial(search, objective.many, enough=enough, noise=count)
+    best, used, smooth = seek(at, evaluations, least=coarse, known=known is not None)
     rested = False
     while not rested:
         before = best.rss
         if used < evaluations and not (roughly or smooth):
-            best, more, _ = search(
-                objective.many, best, evaluations - used, enough=enough, least=coarse, radius=LARGEST
-            )
+            best, more, _ = seek(best, evaluations - used, least=coarse, radius=LARGEST)
             used += more + len(start)
         jacobian = best.jacobian if roughly else objective.jacobian(best.unit, best.white)
         if roughly or used >= evaluations:
             break
         at, left = replace(best, jacobian=jacobian), evaluations - used
-        best, more, smooth = search(objective.many, at, left, enough=enough, least=least, radius=NEARBY, known=True)
+        best, more, smooth = seek(at, left, least=least, radius=NEARBY, known=True)
         used += more + len(start)
-        rested = before - best.rss < CHANCE * enough * best.rss  # so near that the derivatives hold
+        # so near that the derivatives hold, or so little beside what is left that it tells nothing
+        rested = before - best.rss < max(CHANCE * enough * best.rss, LITTLE * (best.rss - count))
     information = jacobian.T @ jacobian + PRIOR * np.eye(len(start))  # the prior bounds what the data leave open
     covariance = np.asarray(np.linalg.inv(information), float)
     return Polished(best.unit, best.white, jacobian, covariance, count, rested)

@@ -23,6 +23,9 @@ RADIUS, LARGEST = 0.1, 0.25
 RIGHT, GOOD, BAD = 0.1, 0.7, 0.1
 #: A fresh model that is wrong about less than this times what is enough is wrong by chance.
 CHANCE = 10.0
+#: So many steps in a row that come to nothing, and each promised less than this share of what is left beyond noise, end
+#: a search: what they go after is the roughness of a model that is wrong by much more.
+IN_VAIN, LITTLE = 3, 0.01
 #: Points so many radii from the best are too far for the model; a worse one is kept if this share of it is new.
 FAR, NEAR = 2.0, 1e-3
 #: A parameter that changes less than this share of what another does is taken for one that does nothing.
@@ -56,6 +59,7 @@ def search(
     *,
     enough: float,
     least: float,
+    noise: float = 0.0,
     radius: float = RADIUS,
     known: bool = False,
 ) -> tuple[Found, int, bool]:
@@ -67,11 +71,12 @@ def search(
         evaluations: at most, after those.
         enough: it ends where a model that was right promises less than this share of the residual sum of squares.
         least: half the side of the smallest box.
+        noise: squares that it alone leaves.
         radius: half the side of the first.
         known: begin with the derivatives that are given.
     """
     model = _Model(many, start, radius, known)
-    used, right = 0, False
+    used, right, in_vain = 0, False, 0
     while used < evaluations and radius >= least:
         step, gain = model.step(radius)
         size = float(np.abs(step).max())
@@ -86,6 +91,9 @@ def search(
         came_true = model.tried(step, radius) / gain
         used += 1
         right = abs(came_true - 1.0) < RIGHT
+        in_vain = in_vain + 1 if came_true < BAD and gain < LITTLE * (model.rss - noise) else 0
+        if in_vain == IN_VAIN:
+            break
         if came_true >= GOOD:
             radius = min(max(2.0 * size, radius / 4.0), LARGEST)
         elif came_true >= BAD:

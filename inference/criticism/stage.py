@@ -148,9 +148,13 @@ class _Tournament:
             found[name] = self.rescaled(there, look) if off else self.climbed(there, look)
         promise = {name: self.looks[name].rss for name in acting}
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
+            if name not in self.in_reach(found, promise):
+                continue
             self.work.study.progress(f"trying {name}", 0, 0)
-            found[name] = self.approached(self.screened(found[name], self.points - len(LADDER)), FIRST_EVALUATIONS)
-        tried = {n: found[n] for n in acting}
+            # what was tried alone began from there, and need not be sought again
+            there = found[name] if name in self.hints else self.screened(found[name], self.points - len(LADDER))
+            found[name] = self.approached(there, FIRST_EVALUATIONS)
+        tried = {n: found[n] for n in self.in_reach(found, promise)}
         goals = {n: least_square(c.fit.unit, c.fit.white, c.fit.jacobian) for n, c in tried.items()}
         for name in _leaders({n: c.rss for n, c in tried.items()}, {n: g[1] for n, g in goals.items()}, CONTENDERS):
             self.work.study.progress(f"looking closer at {name}", 0, 0)
@@ -167,6 +171,18 @@ class _Tournament:
                 fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)
         return [found[name] for name in self.looks]
+
+    def in_reach(self, found: Mapping[str, Candidate], promise: Mapping[str, float]) -> list[str]:
+        """The names in ``promise`` that may still win.
+
+        Beside one that explains as much as is asked for a name, before it is fitted, others that neither came near to
+        what it does nor promise to are not gone into.
+        """
+        plain = self.plain.rss
+        most = plain - min((found[n].rss for n in promise), default=plain)
+        if most < EXPLAINS * (plain - self.plain.count):
+            return list(promise)
+        return [n for n, least in promise.items() if plain - min(least, found[n].rss) > FAR_BEHIND * most]
 
     def until_pairs(self, leader: Candidate) -> float:
         """Up to how many rollouts its rivals are refitted: one that cannot be named alone may be one of two."""

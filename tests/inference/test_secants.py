@@ -106,3 +106,17 @@ def test_it_keeps_to_its_budget(evaluations: int) -> None:
     found = counted.search(start, evaluations)
     assert len(counted.points) <= 4 + evaluations
     assert found.rss <= float(curved(start) @ curved(start))
+
+
+def test_roughness_of_a_model_that_is_far_off_is_not_gone_into() -> None:
+    """Thousands of times what noise leaves stay, whatever is done, and less than a hundredth of it scatters."""
+
+    def rough(unit: FloatArray) -> FloatArray:
+        scatter = np.random.default_rng(np.frombuffer(unit.tobytes(), np.uint32)).normal(size=60)
+        return np.concatenate([linear(unit), [80.0] * 60, 3.0 * scatter])
+
+    start, freely, soon = np.full(4, 0.5), Counted(rough), Counted(rough)
+    told = {"enough": 1e-6, "least": 1e-4}
+    far, near = freely.search(start, noise=np.inf, **told), soon.search(start, noise=120.0, **told)
+    assert len(soon.points) < 0.6 * len(freely.points)
+    assert near.rss < 1.01 * far.rss

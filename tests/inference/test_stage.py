@@ -196,6 +196,18 @@ def test_what_has_come_nearest_is_tried_first() -> None:
     assert _leaders(reached, promised, 2) == ["drag", "lag", "wind"]
 
 
+@pytest.mark.parametrize(("best", "gone_into"), [(1.5, ["drag", "wind", "lag"]), (3.0, ["drag", "wind", "lag", "hem"])])
+def test_what_neither_comes_near_nor_promises_to_is_not_gone_into_beside_an_answer(
+    best: float, gone_into: list[str]
+) -> None:
+    """The model without leaves six times the noise; wind promises three, lag has come to three, the hem to 5.5."""
+    reached = {"drag": best * COUNT, "wind": 5.5 * COUNT, "lag": 3.0 * COUNT, "hem": 5.5 * COUNT}
+    promise = {"drag": 2.0 * COUNT, "wind": 3.0 * COUNT, "lag": 5.9 * COUNT, "hem": 5.4 * COUNT}
+    one = SimpleNamespace(plain=SimpleNamespace(rss=6.0 * COUNT, count=COUNT))
+    found = {name: candidate(name, rss) for name, rss in reached.items()}
+    assert _Tournament.in_reach(one, found, promise) == gone_into  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(
     ("best", "behind", "refitted"), [(1.0, 1.8, ["drag"]), (1.0, 1.6, ["drag", "wind"]), (2.0, 2.0, ["drag"])]
 )
@@ -211,7 +223,7 @@ def test_what_is_far_behind_is_not_refitted(best: float, behind: float, refitted
     work, one = bench(polished)
     work.roughly_polished = lambda effects, *_: candidate(effects[0], left[effects[0]]).fit
     work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
-    looks = {n: replace(one.looks["drag"], name=n, space=candidate(n, COUNT).space) for n in left}
+    looks = {n: replace(one.looks["drag"], name=n, space=candidate(n, COUNT).space, rss=left[n]) for n in left}
     found = _Tournament(work, (), one.plain, looks, {}).run()  # type: ignore[arg-type]
     assert asked == refitted and [c.name for c in found if c.refitted] == refitted
 
