@@ -113,11 +113,12 @@ def invisible(result: dict[str, Any]) -> str:
 
 
 def untried(result: dict[str, Any]) -> str:
-    """The candidates that the budget did not come to: nothing rules them out."""
+    """The candidates that the budget did not come to, of those that these data show: nothing rules them out."""
     if not result["budget_spent"] or result["verdict"] not in ("named", "tied", "none"):
         return ""
     told = (*result["effects"], *result["further"])
-    names = sorted(c["name"] for c in result["candidates"] if not c["tried"] and c["name"] not in told)
+    left = [c for c in result["candidates"] if not c["tried"] and c["identifiability"] > 0.0]
+    names = sorted(c["name"] for c in left if c["name"] not in told)
     if not names:
         return ""
     return (

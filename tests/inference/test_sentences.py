@@ -129,9 +129,10 @@ def test_what_is_told_of_is_not_told_as_invisible() -> None:
 
 def test_what_the_budget_did_not_come_to_is_not_ruled_out() -> None:
     rows = [
-        {"name": n, "tried": tried, "explained": share, "objection": "chance"}
+        {"name": n, "tried": tried, "explained": share, "objection": "chance", "identifiability": 0.5}
         for n, tried, share in (("drag", True, 0.9), ("wind", True, 0.1), ("lag", False, 0.0), ("hem", False, 0.0))
     ]
+    rows += [{"name": "crease", "tried": False, "explained": 0.0, "objection": "invisible", "identifiability": 0.0}]
     about = {"verdict": "named", "effects": ["drag"], "further": [], "simulations": 122, "candidates": rows}
     assert _alternatives(about).startswith("Ruled out: 1 of 3 others that these data can show; none explains")
     cut = untried(about | {"budget_spent": True})
