@@ -136,8 +136,6 @@ def new(
     if lies is not None:
         table["obstacles"] = [{"kind": "table", "height": lies.height, "friction": lies.friction}]
         remarks.append(f"it starts flat at {lies.height:g} m: the table is there ([scenario] obstacles)")
-    # a line, not a bar: what comes next is told by remarks
-    ProgressView()("looking at how the object lies in the recordings", 0, 0)
     whole = {"study": {"measurement": "", "fit_on": fitted}, "scenario": table, "simulator": {"name": simulator}}
     extractor = _found_by(measurement, study)
     shown = Shown() if placed or mesh or extractor else shown_by_markers(whole, measured, study, sizes)
@@ -187,6 +185,8 @@ def new(
         text = study_text(plan)
         return text, build_problem(parse_config(tomllib.loads(text), str(study)), measured, study.parent)
 
+    if plan.start is not None:  # takes many seconds
+        ProgressView()("looking at how the rope lies in the recordings", 0, 0)
     text, problem = draft(plan)
     plan, more = held_as_seen(plan, problem)
     if more:
