@@ -8,10 +8,12 @@ from scipy.optimize import least_squares
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference import polish as polishing
 from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, polish, polish_from
 from muslin.inference.residuals import Offsets
+from muslin.inference.secants import Found
 
 
 class Linear(Objective):
@@ -163,3 +165,21 @@ def test_a_neighbour_that_fails_does_not_pass_for_certainty() -> None:
     np.testing.assert_allclose(slope, objective.matrix, rtol=1e-6)
     objective.wall = 0.001  # one side fails, the other is outside the cube
     assert not objective.jacobian(np.array([0.001, 0.5]))[:, 0].any()
+
+
+@pytest.mark.parametrize(("gain", "rounds"), [(0.004, 1), (0.05, 3)])
+def test_rounds_end_where_one_gains_little_of_what_is_left(
+    monkeypatch: pytest.MonkeyPatch, gain: float, rounds: int
+) -> None:
+    """Of a model that is far off; what noise leaves is told to every search."""
+    told, gains = [], iter([0.0, gain, gain, 0.0])
+
+    def seek(many: object, at: Found, evaluations: int, *, noise: float, **_: object) -> tuple[Found, int, bool]:
+        told.append(noise)
+        return replace(at, white=at.white * np.sqrt(1.0 - next(gains))), 1, True
+
+    monkeypatch.setattr(polishing, "search", seek)
+    far = Linear(2.0)
+    far.matrix = np.tile(far.matrix, (100, 1))
+    assert polish(far, np.array([0.9, 0.1])).rested
+    assert len(told) == 1 + rounds and set(told) == {4000.0}

@@ -156,6 +156,7 @@ def test_a_hint_is_followed_though_it_leaves_more_than_the_model_without(from_th
     tournament, starts = searching(lambda p: 2.0 if p[1] == 0.8 else 3.0, from_there)
     hints = np.array([[0.5, 0.2], [0.5, 0.8]])
     tournament.hints = {"drag": hints}
+    tournament.screened = pytest.fail  # type: ignore[assignment, method-assign]
     (found,) = tournament.run()
     assert starts[0] == pytest.approx(hints[1])
     assert found.rss == pytest.approx(reached * COUNT)
@@ -206,6 +207,23 @@ def test_what_neither_comes_near_nor_promises_to_is_not_gone_into_beside_an_answ
     one = SimpleNamespace(plain=SimpleNamespace(rss=6.0 * COUNT, count=COUNT))
     found = {name: candidate(name, rss) for name, rss in reached.items()}
     assert _Tournament.in_reach(one, found, promise) == gone_into  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("promises", [True, False])
+def test_nothing_is_spent_beside_an_answer_on_what_cannot_win(promises: bool) -> None:
+    gone_into = []
+
+    def roughly_polished(effects: tuple[str, ...], *_: object) -> Polished:
+        gone_into.append(effects[0])
+        return candidate(effects[0], COUNT if effects[0] == "drag" else 1.9 * COUNT).fit
+
+    work, one = bench(lambda effects, *_: candidate(effects[0], COUNT).fit)
+    work.roughly_polished = roughly_polished
+    work.objective = lambda effects: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
+    rss = {"drag": 1.1 * COUNT, "wind": (1.2 if promises else 1.9) * COUNT}
+    looks = {n: replace(one.looks["drag"], name=n, space=candidate(n, COUNT).space, rss=rss[n]) for n in rss}
+    _Tournament(work, (), one.plain, looks, {}).run()  # type: ignore[arg-type]
+    assert set(gone_into) == ({"drag", "wind"} if promises else {"drag"})
 
 
 @pytest.mark.parametrize(
