@@ -7,7 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from ..core.arrays import FloatArray
+from ..core.arrays import BoolArray, FloatArray
 from ..core.measurement import Recording
 from ..core.parameters import ParameterSpace
 from ..core.rollout import Trajectory
@@ -24,6 +24,8 @@ MISFIT, STARTS, APART = 1.1, 4, 0.1
 EVALUATIONS, FEW_EVALUATIONS = 40, 10
 #: A search ends where it promises less in -2 log likelihood.
 TOLD_APART = 0.3
+#: Recordings that are enough to search on, evenly spread, where there are at least twice as many.
+ENOUGH = 10
 #: How far derivatives are trusted at first, and the smallest steps before they are taken.
 NEARBY, COARSE = 0.02, 0.002
 
@@ -117,6 +119,21 @@ class Objective:
         white = residual(recording, predicted.series, self.noise, self.offsets).white
         return self.discrepancy.whitened(recording.name, white)
 
+    def on(self, recordings: Sequence[str]) -> "Objective":
+        """The same of other recordings."""
+        return Objective(self.pool, self.space, recordings, self.noise, self.offsets, self.given, self.discrepancy)
+
+    def part(self, found: Polished, some: "Objective") -> Polished:
+        """A fit of this objective as one of ``some`` of its recordings."""
+        rows = self.rows(some.recordings)
+        white = found.white[rows]
+        return replace(found, white=white, jacobian=found.jacobian[rows], count=some.count(white))
+
+    def rows(self, recordings: Sequence[str]) -> BoolArray:
+        """Which of the white residuals are of ``recordings``, some of those of this objective ``(N,)``."""
+        sizes = [len(failed(self.pool.problem.recordings[name], self.offsets)) for name in self.recordings]
+        return np.repeat([name in recordings for name in self.recordings], sizes)
+
     def count(self, white: FloatArray) -> float:
         """Independent numbers that white residuals ``(N,)`` are worth."""
         return self.noise.information * (len(white) - self.discrepancy.dropped(self.recordings))
@@ -155,6 +172,13 @@ class Objective:
                     columns[:, k] = (row - base) / sides[k]
             missing = np.array([k for k, row in zip(missing, rows, strict=True) if row is None], dtype=np.int64)
         return columns
+
+
+def some_of(recordings: Sequence[str]) -> list[str]:
+    """Those to search on; none where they would be most of ``recordings``."""
+    if len(recordings) < 2 * ENOUGH:
+        return []
+    return [recordings[k] for k in np.linspace(0, len(recordings) - 1, ENOUGH).round().astype(int)]
 
 
 def polish(

@@ -1,11 +1,11 @@
 """A first look at a candidate: what a linear model of the residuals promises, for one rollout a coefficient."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ...core.arrays import FloatArray
+from ...core.arrays import BoolArray, FloatArray
 from ...core.parameters import ParameterSpace
 from ..polish import Objective, Polished
 
@@ -64,6 +64,12 @@ class Look:
     def base(self) -> int:
         """Number of parameters that are not coefficients of this effect."""
         return sum(not p.name.startswith(f"{self.name}.") for p in self.space)
+
+    def on(self, rows: BoolArray) -> "Look":
+        """The same of some of the residuals."""
+        white, jacobian = self.white[rows], self.jacobian[rows]
+        at, rss = least_square(self.start, white, jacobian)
+        return replace(self, white=white, jacobian=jacobian, at=at, rss=rss)
 
     def as_fit(self, plain: Polished, unit: FloatArray, white: FloatArray) -> Polished:
         """A point ``unit (D,)`` with residuals ``white (N,)`` as a fit, with the curvature of this look."""

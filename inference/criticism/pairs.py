@@ -9,7 +9,8 @@ import numpy as np
 from ...core.arrays import FloatArray
 from .candidate import Candidate, best_starts
 from .linear import Look, least_square
-from .stage import FIRST_EVALUATIONS, Stage
+from .stage import Stage
+from .tournament import FIRST_EVALUATIONS
 from .verdict import SIGNIFICANT
 from .work import Work
 

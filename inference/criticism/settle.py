@@ -6,7 +6,8 @@ import numpy as np
 from scipy import stats
 
 from .candidate import Candidate, best_starts
-from .stage import MORE_EVALUATIONS, NEARLY, START_EVALUATIONS, Stage, from_there_too
+from .stage import START_EVALUATIONS, Stage, from_there_too
+from .tournament import MORE_EVALUATIONS, NEARLY
 from .verdict import EXPLAINS, MARGIN, Evidence, decide, objection
 from .work import Work
 

@@ -9,7 +9,8 @@ from ...core.arrays import FloatArray
 from .candidate import Candidate
 from .pairs import Pair, level_with_first, partners, promising_pairs
 from .settle import settled
-from .stage import MORE_EVALUATIONS, Stage, run_stage
+from .stage import Stage, run_stage
+from .tournament import MORE_EVALUATIONS
 from .verdict import (
     HELD_OUT_SHARE,
     HELD_OUT_SLACK,

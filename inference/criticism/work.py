@@ -103,9 +103,15 @@ class Work:
     def space(self, effects: tuple[str, ...]) -> ParameterSpace:
         return self.problem.with_effects(*effects).space
 
-    def objective(self, effects: tuple[str, ...]) -> Objective:
+    def objective(self, effects: tuple[str, ...], recordings: Sequence[str] = ()) -> Objective:
+        """White residuals of the model with ``effects``.
+
+        Args:
+            effects: beside those of the study.
+            recordings: of those that are fitted; left out, all.
+        """
         return Objective(
-            self.pool, self.space(effects), self.problem.fit_on, self.fit.noise, self.offsets,
+            self.pool, self.space(effects), recordings or self.problem.fit_on, self.fit.noise, self.offsets,
             discrepancy=self.discrepancy,
         )  # fmt: skip
 
@@ -150,10 +156,15 @@ class Work:
         return self._as_fitted[key]
 
     def roughly_polished(
-        self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: FloatArray | None
+        self,
+        effects: tuple[str, ...],
+        start: FloatArray,
+        evaluations: int,
+        known: FloatArray | None,
+        recordings: Sequence[str] = (),
     ) -> Polished:
-        """The same with few derivatives; see :func:`~..polish.polish`."""
-        return polish(self.objective(effects), start, evaluations, known=known, roughly=True)
+        """The same with few derivatives, see :func:`~..polish.polish`, and perhaps on some ``recordings`` only."""
+        return polish(self.objective(effects, recordings), start, evaluations, known=known, roughly=True)
 
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
         """Hold out, and put together what decides between candidates for the model that has ``effects``."""

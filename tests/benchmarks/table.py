@@ -45,13 +45,16 @@ def versions() -> dict[str, str]:
 
 
 def commit() -> str:
-    """Of the sources, with a plus sign if they were changed since; "unknown" outside a repository."""
-    asked = subprocess.run(
-        ["git", "-C", str(RESULTS.parent), "describe", "--always", "--exclude=*", "--dirty=+"],
-        capture_output=True,
-        text=True,
-    )
-    return asked.stdout.strip() or "unknown"
+    """Of the sources, with a plus sign if they were changed since; "unknown" outside a repository.
+
+    What benchmarks themselves write is no source, so that of several rows all are of one commit.
+    """
+
+    def git(*asked: str) -> str:
+        return subprocess.run(["git", "-C", str(RESULTS.parent), *asked], capture_output=True, text=True).stdout.strip()
+
+    found = git("describe", "--always", "--exclude=*") or "unknown"
+    return found + ("+" if git("diff", "HEAD", "--name-only", "--", ":!results", ":!docs") else "")
 
 
 def row(cells: Sequence[str]) -> str:

@@ -11,7 +11,7 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference import polish as polishing
 from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
-from muslin.inference.polish import Objective, polish, polish_from
+from muslin.inference.polish import Objective, polish, polish_from, some_of
 from muslin.inference.residuals import Offsets
 from muslin.inference.secants import Found
 
@@ -183,3 +183,9 @@ def test_rounds_end_where_one_gains_little_of_what_is_left(
     far.matrix = np.tile(far.matrix, (100, 1))
     assert polish(far, np.array([0.9, 0.1])).rested
     assert len(told) == 1 + rounds and set(told) == {4000.0}
+
+
+@pytest.mark.parametrize(("fitted", "some"), [(19, []), (25, [0, 3, 5, 8, 11, 13, 16, 19, 21, 24])])
+def test_many_recordings_are_searched_by_some_from_all_over(fitted: int, some: list[int]) -> None:
+    names = [f"take {k}" for k in range(fitted)]
+    assert some_of(names) == [names[k] for k in some]

@@ -128,3 +128,21 @@ def test_evidence_says_whether_held_out_motions_would_show_a_candidate(ar1: floa
     squares = [np.sum(((BEST - plain.unit[0] - m) * WAVE + 0.2 * OTHER) ** 2) for m in (0.0, *moved)]
     gains = [worth * (squares[0] - after) / noise.sd**2 for after in squares[1:]]
     np.testing.assert_allclose([c.held_out_gain for c in found], gains, rtol=1e-6)
+
+
+@pytest.mark.parametrize("offsets", [Offsets(), Offsets(clock=0.01, constant=0.01)])
+def test_the_residuals_of_some_recordings_are_found_among_those_of_all(offsets: Offsets) -> None:
+    pool, names = Pool(), ("r", "late", "long")
+    hidden = BEST * WAVE + 0.01
+    hidden[3:7, 1] = np.nan
+    late, long = PointSeries(TIME, hidden), PointSeries(TIME, BEST * WAVE - 0.02)
+    pool.problem.recordings |= {"late": Recording("late", late), "long": Recording("long", long)}
+    every, unit = Objective(pool, SPACE, names, NOISE, offsets), np.array([0.8])  # type: ignore[arg-type]
+    for some in (["late"], ["r", "long"], list(names)):
+        few = Objective(pool, SPACE, some, NOISE, offsets)  # type: ignore[arg-type]
+        np.testing.assert_array_equal(every.one(unit)[every.rows(some)], few.one(unit))
+    assert not every.rows([]).any()
+    found = every.part(polish(every, unit, 4), few := every.on(["late"]))
+    again = polish(few, found.unit, 1)
+    np.testing.assert_array_equal(found.white, few.one(found.unit))
+    assert found.count == again.count == len(found.white)

@@ -1,0 +1,67 @@
+"""The best fit of a study with many recordings: searched on some of them, and kept if it is better on all."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from muslin.core.arrays import FloatArray
+from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.inference.noise import Noise
+from muslin.inference.polish import Objective, Polished, polish, some_of
+from muslin.inference.residuals import Offsets
+from muslin.inference.sequential.polishing import Polishing
+
+NAMES = [str(k) for k in range(20)]
+SEARCHED = some_of(NAMES)
+SHARP = 100.0
+#: Numbers that a recording shows.
+SEEN = 5
+
+
+class Valleys(Objective):
+    """Two valleys: every recording leaves what noise does at 0.8, and at 0.2 a misfit, which ``elsewhere`` may lessen.
+
+    Args:
+        elsewhere: what is left at 0.2 of recordings that are not searched on [noise standard deviations].
+        recordings: names.
+    """
+
+    def __init__(self, elsewhere: float, recordings: list[str]) -> None:
+        space = ParameterSpace((Parameter("a", "1", 0, 1),))
+        noise = Noise(1.0, 0.0, "test", "m", 0.01)
+        super().__init__(None, space, recordings, noise, Offsets())  # type: ignore[arg-type]
+        self.elsewhere, self.evaluations = elsewhere, 0
+
+    def on(self, recordings: list[str]) -> "Valleys":  # type: ignore[override]
+        return Valleys(self.elsewhere, recordings)
+
+    def rows(self, recordings: list[str]) -> FloatArray:  # type: ignore[override]
+        return np.repeat([name in recordings for name in self.recordings], SEEN)
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        self.evaluations += len(units)
+        return [np.concatenate([self.left(name, u[0]) for name in self.recordings]) for u in units]
+
+    def left(self, name: str, unit: float) -> FloatArray:
+        near, least = (0.8, 1.0 if name in SEARCHED else self.elsewhere) if unit > 0.5 else (0.2, 2.0)
+        return np.full(SEEN, np.hypot(least, SHARP * (unit - near)))
+
+
+@pytest.mark.parametrize(("elsewhere", "kept"), [(1.0, True), (9.0, False)])
+def test_a_better_place_is_searched_on_some_recordings_and_kept_if_it_is_better_on_all(
+    elsewhere: float, kept: bool
+) -> None:
+    objective = Valleys(elsewhere, NAMES)
+    best = polish(objective, np.array([0.25]))
+    assert best.unit[0] == pytest.approx(0.2, abs=0.01)
+    rested: list[Polished] = []
+    polishing = SimpleNamespace(
+        objective=objective, best=best, simulations=0, _pool=SimpleNamespace(count=0),
+        _study=SimpleNamespace(progress=lambda *_: None), _rest=lambda _, found: rested.append(found),
+    )  # fmt: skip
+    objective.evaluations = 0
+    Polishing.look_from(polishing, np.array([[0.3], [0.75], [0.9]]))  # type: ignore[arg-type]
+    assert [round(float(found.unit[0]), 2) for found in rested] == ([0.8] if kept else [])
+    assert all(len(found.white) == SEEN * len(NAMES) for found in rested)
+    assert objective.evaluations < 20  # the end of one search; all else on some
