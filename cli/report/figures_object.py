@@ -56,14 +56,17 @@ class Snapshot:
         return self.correspondence and self.predicted.shape == self.measured.shape
 
     def errors(self) -> FloatArray:
-        """Distance ``(P,)`` of each predicted point to its measured one, or to the nearest without correspondence.
+        """Distance ``(P,)`` of each predicted point to its measured one.
 
         Of a point that was measured along some axes only, the distance along these; NaN of one that was not seen.
+        Without correspondence, how far the nearest measured one is from the object: what no camera saw is not wrong.
         """
         if self.paired:
             return distance(self.predicted - self.measured)
         gaps = self._gaps()
-        return np.asarray(gaps.min(axis=1) if gaps.size else np.full(len(self.predicted), np.nan))
+        if not gaps.size:
+            return np.full(len(self.predicted), np.nan)
+        return np.asarray(gaps.min(axis=0)[gaps.argmin(axis=1)])
 
     def distances(self) -> FloatArray:
         """Distance of each point that was measured ``(N,)`` to its predicted one, or to the nearest."""

@@ -76,8 +76,8 @@ def _pack(take: Take, name: str, frames: list[int]) -> str:
 
 
 def _rms(shot: Snapshot) -> float:
-    errors = shot.errors()
-    return round(float(np.sqrt(np.nanmean(errors**2))), 5) if np.isfinite(errors).any() else 0.0
+    far = shot.distances()
+    return round(float(np.sqrt(np.mean(far**2))), 5) if len(far) else 0.0
 
 
 def _base64(values: Any) -> str:

@@ -1,5 +1,6 @@
 """The object at its worst moment: what is drawn of it, and how far away its points are said to be."""
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,6 +9,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from muslin.cli.report.figures_object import Snapshot, add_snapshots, camera, draw_snapshot, window
+from muslin.cli.report.findings import Take
+from muslin.cli.report.player import player_data
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.0, 0.1], [0.0, 0.0, 0.1]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -22,9 +25,28 @@ def test_a_cloud_is_as_far_away_as_what_was_seen_of_it() -> None:
     """A camera that sees a corner says nothing about the rest, which a model that is right has, too."""
     seen = replace(SHOT, measured=np.array([[0.0, 0.01, 0.0], [np.nan] * 3]), correspondence=False)
     np.testing.assert_allclose(seen.distances(), 0.01)
-    assert seen.errors().max() > 0.1
+    np.testing.assert_allclose(seen.errors(), 0.01)  # nor is the rest coloured as if it were wrong
     unseen = replace(seen, measured=np.full((2, 3), np.nan))
     assert not len(unseen.distances()) and np.isnan(unseen.errors()).all()
+
+
+def test_a_model_is_coloured_by_what_was_seen_nearest_to_it() -> None:
+    cloud = replace(SHOT, measured=np.array([[0.0, 0.01, 0.0], [0.1, 0.03, 0.1]]), correspondence=False)
+    np.testing.assert_allclose(cloud.errors()[[0, 2]], [0.01, 0.03])
+    np.testing.assert_allclose(cloud.vertex_errors()[[0, 2]], [0.01, 0.03], rtol=0.1)
+
+
+def test_the_film_says_of_a_cloud_how_far_what_was_seen_is_from_the_object() -> None:
+    frames = np.repeat(SQUARE[None], 20, axis=0)
+    cloud = np.repeat(np.array([[[0.0, 0.003, 0.0], [0.0, 0.004, 0.0], [np.nan] * 3]]), 20, axis=0)
+    take = Take(
+        "lift", "fitted", {"worst_time": 0.0}, np.arange(20.0), np.zeros(20),
+        measured=cloud, predicted=frames, vertices=frames, triangles=TRIANGLES, correspondence=False,
+    )  # fmt: skip
+    film = player_data(SimpleNamespace(takes=[take], after_label=""))  # type: ignore[arg-type]
+    assert film is not None
+    (model,) = json.loads(film["data"])["models"]
+    np.testing.assert_allclose(model["rms"], np.sqrt(12.5), atol=0.006)  # [mm]
 
 
 def test_what_is_far_higher_than_wide_gets_a_window_that_its_title_fits() -> None:
