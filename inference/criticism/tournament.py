@@ -109,7 +109,8 @@ class Tournament:
                 self.work.study.progress(f"trying {name}", 0, 0)
                 found[name] = self.from_hints(found[name], self.hints[name])
         for k, name in enumerate(acting):
-            self.work.study.progress(f"screening {name}", k + 1, len(acting))
+            if not self.goes_on(f"screening {name}", k + 1, len(acting)):
+                break
             look = self.looks[name]
             there = self.moved(found[name], look.at[None])
             off = look.reach >= FAR_OFF  # then points farther away are wrong by as much
@@ -118,18 +119,27 @@ class Tournament:
         for name in _leaders({n: found[n].rss for n in acting}, promise, SCREENED):
             if name not in self.in_reach(found, promise):
                 continue
-            self.work.study.progress(f"trying {name}", 0, 0)
+            if not self.goes_on(f"trying {name}"):
+                break
             # what was tried alone began from there, and need not be sought again
             there = found[name] if name in self.hints else self.screened(found[name], self.points - len(LADDER))
             found[name] = self.approached(there, FIRST_EVALUATIONS)
         tried = {n: found[n] for n in self.in_reach(found, promise)}
         goals = {n: least_square(c.fit.unit, c.fit.white, c.fit.jacobian) for n, c in tried.items()}
         for name in _leaders({n: c.rss for n, c in tried.items()}, {n: g[1] for n, g in goals.items()}, CONTENDERS):
-            self.work.study.progress(f"looking closer at {name}", 0, 0)
+            if not self.goes_on(f"looking closer at {name}"):
+                break
             # steps of a bounded search from near a bound are short; this looks at what lies behind them
             there = self.moved(found[name], goals[name][0][None])
             found[name] = self.approached(there, CONTENDER_EVALUATIONS)
         return found
+
+    def goes_on(self, title: str, done: int = 0, of: int = 0) -> bool:
+        """Is something left for this? Then it is what is said to be done."""
+        left = self.work.may_go_on(self.until)
+        if left:
+            self.work.study.progress(title, done, of)
+        return left
 
     def objective(self, name: str) -> Objective:
         """Of the model with one of the candidates."""

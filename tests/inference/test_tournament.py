@@ -89,8 +89,12 @@ def test_a_candidate_that_the_budget_does_not_come_to_is_not_tried(spent: bool) 
     work, tournament = bench(lambda effects, unit, *_: candidate("drag", 3 * COUNT).fit)
     work.objective = lambda *_: SimpleNamespace(many=lambda points: [np.full(int(COUNT), 3.0) for _ in points])
     work.count = work.limit if spent else 0
+    said: list[str] = []
+    work.study.progress = lambda title, *_: said.append(title)
     (found,) = tournament.run()
     assert found.tried is not spent
+    done = ["screening drag", "trying drag", "looking closer at drag", "refitting drag"]
+    assert said == ([] if spent else done)  # nor is it said to be
 
 
 @pytest.mark.parametrize(("from_there", "reached"), [(1.0, 1.0), (3.0, 2.0)])
