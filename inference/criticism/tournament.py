@@ -65,12 +65,9 @@ class Tournament:
         self.rng = {name: np.random.default_rng([seed, 47, *name.encode()]) for name in looks}
 
     def run(self) -> list[Candidate]:
-        """All candidates, those that lead fitted to the end.
-
-        Who leads shows on some of many recordings, too.
-        """
+        """All candidates, those that lead fitted to the end."""
         some = some_of(self.work.problem.fit_on)
-        found = self.brought(self.on(some).leading()) if some else self.leading()
+        found = self.led_on(some) if some else self.leading()
         order = sorted(found.values(), key=lambda c: c.rank)
         most = self.plain.rss - order[0].rss
         for k, c in enumerate(order):
@@ -88,6 +85,13 @@ class Tournament:
         rows = objective.rows(recordings)
         looks = {name: look.on(rows) for name, look in self.looks.items()}
         return Tournament(self.work, self.effects, objective.part(self.plain, some), looks, self.hints, recordings)
+
+    def led_on(self, recordings: Sequence[str]) -> dict[str, Candidate]:
+        """All candidates, those that lead on some recordings gone into there; what acts on none of these, on all."""
+        part = self.on(recordings)
+        found = self.brought(part.leading())
+        rare = {n: k for n, k in self.looks.items() if k.responds and not part.looks[n].responds}
+        return found | (Tournament(self.work, self.effects, self.plain, rare, self.hints).leading() if rare else {})
 
     def brought(self, found: Mapping[str, Candidate]) -> dict[str, Candidate]:
         """Candidates that were ``found`` on some recordings as they are on all; the best first."""

@@ -230,3 +230,23 @@ def test_who_leads_is_found_on_some_recordings_and_held_against_all(elsewhere: f
     assert asked.count(2 * half) == 1 and asked[-1] == 2 * half  # held against all once, in the end
     assert found.tried and len(found.fit.white) == 2 * half
     assert bool(refitted[0][1]) is (elsewhere < 4.0)  # what is worse on all is not gone on from
+
+
+def test_what_acts_on_recordings_alone_that_are_not_searched_is_searched_on_all() -> None:
+    half, asked = int(COUNT) // 2, list[int]()
+
+    def objective(effects: tuple[str, ...], recordings: Sequence[str] = ()) -> SimpleNamespace:
+        def many(points: FloatArray) -> list[FloatArray]:
+            asked.extend([len(recordings)] * len(points))
+            return [np.full(half if recordings else 2 * half, 3.0) for _ in points]
+
+        def part(found: Polished, some: SimpleNamespace) -> Polished:
+            return replace(found, white=found.white[:half], jacobian=found.jacobian[:half], count=half)
+
+        return SimpleNamespace(many=many, rows=lambda _: np.arange(2 * half) < half, part=part)
+
+    work, tournament = bench(lambda *_: candidate("drag", COUNT).fit)
+    work.objective, work.problem.fit_on = objective, [str(k) for k in range(20)]
+    tournament.looks["drag"].jacobian[:half, 1] = 0.0
+    (found,) = tournament.run()
+    assert found.tried and asked and not any(asked)
