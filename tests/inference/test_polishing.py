@@ -1,15 +1,21 @@
 """The best fit of a study with many recordings: searched on some of them, and kept if it is better on all."""
 
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from small import TRUTH, small_measurement, write_study
 
 from muslin.core.arrays import FloatArray
+from muslin.core.measurement import Measurement
 from muslin.core.parameters import Parameter, ParameterSpace
+from muslin.core.study import Study
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, Polished, polish, some_of
 from muslin.inference.residuals import Offsets
+from muslin.inference.sequential import polishing
 from muslin.inference.sequential.polishing import Polishing
 
 NAMES = [str(k) for k in range(20)]
@@ -65,3 +71,30 @@ def test_a_better_place_is_searched_on_some_recordings_and_kept_if_it_is_better_
     assert [round(float(found.unit[0]), 2) for found in rested] == ([0.8] if kept else [])
     assert all(len(found.white) == SEEN * len(NAMES) for found in rested)
     assert objective.evaluations < 20  # the end of one search; all else on some
+
+
+def test_a_fit_of_many_takes_is_searched_on_some_and_ends_on_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    takes = [
+        replace(r, name=f"{r.name} {k}")
+        for k in range(10)
+        for r in small_measurement(seed=k).recordings
+        if r.name != "other"
+    ]
+    other = small_measurement().recordings[-1]
+    study = Study.load(write_study(tmp_path, Measurement((*takes, other))), workers=0)
+    real, searched = polishing.polish_from, []
+
+    def noted(objective: Objective, starts: FloatArray, best: Polished | None = None) -> Polished:
+        searched.append(objective.recordings)
+        return real(objective, starts, best)
+
+    monkeypatch.setattr(polishing, "polish_from", noted)
+    fit = study.fit()
+    assert searched and all(names == some_of([r.name for r in takes]) for names in searched)
+    truth = np.array([TRUTH.stretch_stiffness, TRUTH.bending_rigidity])
+    assert np.all(np.abs(fit.estimate - truth) < 4 * fit.sd), (fit.estimate, fit.sd)
+    on_two = Study.load(write_study(tmp_path / "two", Measurement((*takes[:2], other))), workers=0).fit()
+    assert np.all(fit.sd < 0.5 * on_two.sd)  # ten times as much tells it
