@@ -11,6 +11,7 @@ from small import small_measurement, write_study
 from test_verdict import COUNT, candidate, evidence
 
 from muslin.core.errors import InputError
+from muslin.core.measurement import Measurement
 from muslin.core.study import Study
 from muslin.inference.criticism import work
 from muslin.inference.criticism.before_after import BeforeAfter
@@ -82,6 +83,22 @@ def test_air_drag_is_named_and_adding_it_brings_the_held_out_error_to_the_noise(
     again = added.diagnose().result  # with the effect in the model nothing more is missing
     check_schema(again)
     assert again["effects"] == [] and again["verdict"] in ("no-misfit", "cannot-tell")
+
+
+@pytest.mark.slow
+def test_of_many_takes_the_same_is_named(tmp_path: Path) -> None:
+    """Who leads is found on some of them."""
+    drag = AirDrag(drag_coefficient=1.2)
+    takes = [replace(r, name=f"{r.name} {k}") for k in range(10) for r in small_measurement(drag, seed=k).recordings]
+    others = [r.name for r in takes if r.name.startswith("other")]
+    study = Study.load(write_study(tmp_path, Measurement(tuple(takes)), hold_out=others))
+    study.config.diagnose.candidates = ["actuator-lag", "air-drag", "gravity-tilt", "viscous-damping"]
+    study.fit()
+    found = study.diagnose().result
+    assert (found["verdict"], found["effects"]) == ("named", ["air-drag"])
+    assert all(c["tried"] for c in found["candidates"])
+    (coefficient,) = (c["coefficients"]["drag_coefficient"] for c in found["candidates"] if c["name"] == "air-drag")
+    assert abs(coefficient["mean"] - 1.2) < 4 * coefficient["sd"]
 
 
 @pytest.mark.slow
