@@ -136,7 +136,7 @@ class Polishing:
         objective = Objective(self._pool, space, names, self.noise, offsets, discrepancy=discrepancy)
         some = _some_of(objective)
         best = polish_from(some, np.concatenate([near[None], self._in_order(upto, discrepancy)[0]]))
-        self._rest(objective, _on_all(objective, some, best))
+        self._rest(objective, _on_all(objective, some, best, near))
 
     def _rest(self, objective: Objective, best: Polished) -> None:
         """Go on from what a search has led to until it rests, and keep that."""
@@ -188,6 +188,13 @@ def _some_of(objective: Objective) -> Objective:
     return objective.on(names) if names else objective
 
 
-def _on_all(objective: Objective, some: Objective, best: Polished) -> Polished:
-    """A fit to some recordings as one to all."""
-    return best if some is objective else polish(objective, best.unit)
+def _on_all(objective: Objective, some: Objective, best: Polished, near: FloatArray | None = None) -> Polished:
+    """A fit to some recordings as one to all; with ``near (D,)``, no worse than there."""
+    if some is objective:
+        return best
+    start = best.unit
+    if near is not None:
+        rows = objective.many(np.stack([start, near]))
+        left = [np.inf if row is None else float(row @ row) for row in rows]
+        start = near if left[1] < left[0] else start
+    return polish(objective, start)

@@ -16,7 +16,7 @@ from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, Polished, polish, some_of
 from muslin.inference.residuals import Offsets
 from muslin.inference.sequential import polishing
-from muslin.inference.sequential.polishing import Polishing
+from muslin.inference.sequential.polishing import Polishing, _on_all
 
 NAMES = [str(k) for k in range(20)]
 SEARCHED = some_of(NAMES)
@@ -71,6 +71,15 @@ def test_a_better_place_is_searched_on_some_recordings_and_kept_if_it_is_better_
     assert [round(float(found.unit[0]), 2) for found in rested] == ([0.8] if kept else [])
     assert all(len(found.white) == SEEN * len(NAMES) for found in rested)
     assert objective.evaluations < 20  # the end of one search; all else on some
+
+
+def test_what_is_worse_on_all_recordings_than_where_the_search_began_is_left() -> None:
+    objective = Valleys(9.0, NAMES)
+    some = objective.on(SEARCHED)
+    better = polish(some, np.array([0.75]))
+    assert better.unit[0] == pytest.approx(0.8, abs=0.01)
+    found = _on_all(objective, some, better, np.array([0.22]))
+    assert found.unit[0] == pytest.approx(0.2, abs=0.01) and len(found.white) == SEEN * len(NAMES)
 
 
 def test_a_fit_of_many_takes_is_searched_on_some_and_ends_on_all(
