@@ -12,6 +12,7 @@ from ..core.measurement import Recording
 from ..core.parameters import ParameterSpace
 from ..core.rollout import Trajectory
 from ..core.study import SimulationPool, Task
+from .descent import descend
 from .discrepancy import NONE, Discrepancy
 from .noise import Noise
 from .residuals import Offsets, failed, residual
@@ -24,8 +25,6 @@ MISFIT, STARTS, APART = 1.1, 4, 0.1
 EVALUATIONS, FEW_EVALUATIONS = 40, 10
 #: A search ends where it promises less in -2 log likelihood.
 TOLD_APART = 0.3
-#: Recordings that are enough to search on, evenly spread, where there are at least twice as many.
-ENOUGH = 10
 #: How far derivatives are trusted at first, and the smallest steps before they are taken.
 NEARBY, COARSE = 0.02, 0.002
 
@@ -83,6 +82,7 @@ class Objective:
         given: values of other parameters, by recording.
         discrepancy: how else than by noise a right model may be off; residuals are whitened by it too, and its step is
             that of derivatives.
+        smooth: derivatives hold far enough to follow them.
     """
 
     def __init__(
@@ -94,9 +94,10 @@ class Objective:
         offsets: Offsets,
         given: Mapping[str, dict[str, float]] | None = None,
         discrepancy: Discrepancy = NONE,
+        smooth: bool = False,
     ) -> None:
         self.pool, self.space, self.recordings = pool, space, list(recordings)
-        self.discrepancy = discrepancy
+        self.discrepancy, self.smooth = discrepancy, smooth
         self.noise, self.offsets, self.given = noise, offsets, dict(given or {})
         self._last: tuple[FloatArray, FloatArray] | None = None
 
@@ -121,7 +122,8 @@ class Objective:
 
     def on(self, recordings: Sequence[str]) -> "Objective":
         """The same of other recordings."""
-        return Objective(self.pool, self.space, recordings, self.noise, self.offsets, self.given, self.discrepancy)
+        given = self.given, self.discrepancy, self.smooth
+        return Objective(self.pool, self.space, recordings, self.noise, self.offsets, *given)
 
     def part(self, found: Polished, some: "Objective") -> Polished:
         """A fit of this objective as one of ``some`` of its recordings."""
@@ -174,13 +176,6 @@ class Objective:
         return columns
 
 
-def some_of(recordings: Sequence[str]) -> list[str]:
-    """Those to search on; none where they would be most of ``recordings``."""
-    if len(recordings) < 2 * ENOUGH:
-        return []
-    return [recordings[k] for k in np.linspace(0, len(recordings) - 1, ENOUGH).round().astype(int)]
-
-
 def polish(
     objective: Objective,
     start: FloatArray,
@@ -189,11 +184,12 @@ def polish(
     known: FloatArray | None = None,
     roughly: bool = False,
 ) -> Polished:
-    """Bounded least squares from ``start`` in the unit cube; see :mod:`.secants`.
+    """Bounded least squares from ``start`` in the unit cube, by derivatives where these hold; see :mod:`.descent`.
 
-    Where it comes to rest on a kink it looks around farther off, be there a misfit or not: what is left may be no more
-    than noise and the parameters wrong. Then it goes on by derivatives, which see a way down a narrow valley that wide
-    differences do not; and so on, until that gains next to nothing.
+    Elsewhere it is by secants, see :mod:`.secants`. Where they come to rest on a kink it looks around farther off, be
+    there a misfit or not: what is left may be no more than noise and the parameters wrong. Then it goes on by
+    derivatives, which see a way down a narrow valley that wide differences do not; and so on, until that gains next to
+    nothing.
 
     Args:
         objective: to make least.
@@ -208,7 +204,15 @@ def polish(
     enough, coarse = TOLD_APART / count, max(least, COARSE)
     at = Found(start, white, np.zeros((len(white), len(start))) if known is None else known)
     seek = partial(search, objective.many, enough=enough, noise=count)
-    best, used, smooth = seek(at, evaluations, least=coarse, known=known is not None)
+    used, from_there = 0, known is not None
+    if objective.smooth and not roughly:
+        follow = partial(descend, objective.many, objective.jacobian, enough=enough, noise=count)
+        at, used, rested = follow(at, evaluations, least=coarse, known=from_there)
+        if rested or used >= evaluations:
+            return _told(at, count, rested)
+        from_there = False  # derivatives are those of one side of a kink
+    best, more, smooth = seek(at, evaluations - used, least=coarse, known=from_there)
+    used += more
     rested = False
     while not rested:
         before = best.rss
@@ -223,9 +227,14 @@ def polish(
         used += more + len(start)
         # so near that the derivatives hold, or so little beside what is left that it tells nothing
         rested = before - best.rss < max(CHANCE * enough * best.rss, LITTLE * (best.rss - count))
-    information = jacobian.T @ jacobian + PRIOR * np.eye(len(start))  # the prior bounds what the data leave open
+    return _told(replace(best, jacobian=jacobian), count, rested)
+
+
+def _told(best: Found, count: float, rested: bool) -> Polished:
+    """With how far the data let the parameters move; the prior bounds what they leave open."""
+    information = best.jacobian.T @ best.jacobian + PRIOR * np.eye(len(best.unit))
     covariance = np.asarray(np.linalg.inv(information), float)
-    return Polished(best.unit, best.white, jacobian, covariance, count, rested)
+    return Polished(best.unit, best.white, best.jacobian, covariance, count, rested)
 
 
 def searches(objective: Objective, starts: FloatArray, known: Sequence[FloatArray]) -> Iterator[Polished]:

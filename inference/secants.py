@@ -136,18 +136,8 @@ class _Model:
         return Found(self.unit, self.white, np.asarray(slopes.T))
 
     def step(self, radius: float) -> tuple[FloatArray, float]:
-        """Where the residuals of the model are least within the box and the cube ``(D,)``, and how much it promises."""
-        jacobian = self.found.jacobian
-        sizes = np.linalg.norm(jacobian, axis=0)
-        moves = sizes > FLAT * sizes.max()  # rounding is no reason to go anywhere
-        step = np.zeros(len(self.unit))
-        if moves.any():
-            basis, triangle = np.linalg.qr(jacobian[:, moves])
-            low, high = np.maximum(-radius, -self.unit)[moves], np.minimum(radius, 1.0 - self.unit)[moves]
-            found = lsq_linear(triangle, -basis.T @ self.white, (low, high), method="bvls").x
-            step[moves] = np.clip(found, low, high)
-        there = self.white + jacobian @ step
-        return step, self.rss - float(there @ there)
+        """See :func:`linear_step`."""
+        return linear_step(self.found, radius)
 
     def tried(self, step: FloatArray, radius: float) -> float:
         """Simulate there, keep it if it is better or tells more than a point that is kept, and return what it gains."""
@@ -191,3 +181,17 @@ class _Model:
             self.unit, unit = unit, self.unit
             self.white, white = white, self.white
         self.points[k], self.whites[k] = unit, white
+
+
+def linear_step(at: Found, radius: float) -> tuple[FloatArray, float]:
+    """Where a linear model leaves least within the box and the cube ``(D,)``, from there, and how much it promises."""
+    sizes = np.linalg.norm(at.jacobian, axis=0)
+    moves = sizes > FLAT * sizes.max()  # rounding is no reason to go anywhere
+    step = np.zeros(len(at.unit))
+    if moves.any():
+        basis, triangle = np.linalg.qr(at.jacobian[:, moves])
+        low, high = np.maximum(-radius, -at.unit)[moves], np.minimum(radius, 1.0 - at.unit)[moves]
+        found = lsq_linear(triangle, -basis.T @ at.white, (low, high), method="bvls").x
+        step[moves] = np.clip(found, low, high)
+    there = at.white + at.jacobian @ step
+    return step, at.rss - float(there @ there)

@@ -57,7 +57,7 @@ def promising_pairs(work: Work, stage: Stage) -> list[Pair]:
         if not work.may_go_on():
             break
         work.study.progress(f"trying {lead.name} with {other.name}", 0, 0)
-        starts = best_starts(work.objective((lead.name, other.name)), _starts(work, stage, lead, other))
+        starts = best_starts(work.quick((lead.name, other.name)), _starts(work, stage, lead, other))
         if starts:
             found.append(_fitted(work, lead, other, starts[0][0], FIRST_EVALUATIONS))
             if stage.evidence.left(found[-1].both) == 0.0 and (not passing or passing & set(found[-1].names)):
@@ -90,7 +90,7 @@ def _left(pair: Pair) -> float:
 
 def _fitted(work: Work, lead: Candidate, other: Candidate, start: FloatArray, evaluations: int) -> Pair:
     effects = (lead.name, other.name)
-    fit = work.roughly_polished(effects, start, evaluations, None)
+    fit = work.roughly_searched(effects, start, evaluations)
     return Pair(lead, replace(other, space=work.space(effects), base=len(lead.space), fit=fit))
 
 

@@ -57,8 +57,8 @@ def _fitted_on(work: Work, stage: Stage, c: Candidate, until: float) -> Candidat
         rng = np.random.default_rng([work.study.config.study.seed, 53, *c.name.encode()])
         points = np.repeat(c.fit.unit[None], PLACES, axis=0)
         points[:, : c.base] = stats.qmc.Sobol(c.base, rng=rng).random(PLACES)
-        for unit, _ in best_starts(work.objective(effects), points)[:RESTARTS]:
-            there = work.roughly_polished(effects, unit, START_EVALUATIONS, None)
+        for unit, _ in best_starts(work.quick(effects), points)[:RESTARTS]:
+            there = work.roughly_searched(effects, unit, START_EVALUATIONS)
             if c.rss - there.rss > MARGIN:  # more than the same place again
                 c = replace(c, fit=work.polished(effects, there.unit, MORE_EVALUATIONS))
     return c

@@ -241,7 +241,7 @@ def _beside(work: Work, rival: Candidate, second: Candidate) -> Candidate:
     effects = (rival.name, second.name)
     space, values = work.space(effects), dict(zip(second.space.names, second.fit.unit, strict=True))
     values |= dict(zip(rival.space.names, rival.fit.unit, strict=True))
-    fit = work.polished(effects, np.array([values[n] for n in space.names]), MORE_EVALUATIONS)
+    fit = work.searched(effects, np.array([values[n] for n in space.names]), MORE_EVALUATIONS)
     return work.judged(replace(second, space=space, base=len(rival.space), fit=fit))
 
 
@@ -253,7 +253,7 @@ def _without_idle(work: Work, found: Findings) -> Findings:
         others = tuple(e for e in found.effects if e != dropped)
         space = work.space(others)
         kept = [best.space.names.index(name) for name in space.names]
-        fit = work.polished(others, best.fit.unit[kept], MORE_EVALUATIONS)
+        fit = work.searched(others, best.fit.unit[kept], MORE_EVALUATIONS)
         if fit.rss - best.rss < MARGIN + SHARE_LEFT * left:
             base = len(work.space(others[:-1]))
             after = replace(best, name=others[-1], space=space, base=base, fit=fit)

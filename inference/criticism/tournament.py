@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ..polish import Objective, Polished, some_of
+from ..polish import Objective, Polished
+from ..some import some_of
 from .candidate import Candidate, best_starts, screening_points
 from .linear import Look, least_square
 from .verdict import EXPLAINS
@@ -75,7 +76,7 @@ class Tournament:
             until = self.until_pairs(found[order[0].name]) if k else float("inf")
             if (k == 0 or near) and self.work.may_go_on(until):
                 self.work.study.progress(f"refitting {c.name}", 0, 0)
-                fit = self.work.polished((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
+                fit = self.work.searched((*self.effects, c.name), c.fit.unit, MORE_EVALUATIONS)
                 found[c.name] = replace(c, fit=min(fit, c.fit, key=lambda p: p.rss), refitted=True, tried=True)
         return [found[name] for name in self.looks]
 

@@ -16,6 +16,7 @@ from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.polishing import offsets_of
 from ..sequential.result import FitResult
 from ..sequential.together import told_together
+from ..some import on_all, on_some
 from .candidate import Candidate, root_mean_square
 from .held_out import HeldOut, held_out_residuals
 from .numerics import numerics
@@ -112,8 +113,12 @@ class Work:
         """
         return Objective(
             self.pool, self.space(effects), recordings or self.problem.fit_on, self.fit.noise, self.offsets,
-            discrepancy=self.discrepancy,
+            discrepancy=self.discrepancy, smooth=self.problem.pieces > 1,
         )  # fmt: skip
+
+    def quick(self, effects: tuple[str, ...]) -> Objective:
+        """The same of as many recordings as are enough to search on."""
+        return on_some(self.objective(effects))
 
     def see_numerics(self, effects: tuple[str, ...], unit: FloatArray) -> None:
         """Look at the model's own errors where it fits best so far, and at what it cannot repeat there."""
@@ -133,10 +138,21 @@ class Work:
     def polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """A least-squares fit of the model with ``effects``, of as many evaluations as the budget has left."""
         objective = self.objective(effects)
-        # it begins and ends with derivatives
-        left = max(1, (self.limit - self.count) // len(self.problem.fit_on) - 2 * len(objective.space))
+        return polish(objective, start, self._affordable(objective, evaluations))
+
+    def searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
+        """The same from where it may be far from: of many recordings some lead it nearer first."""
+        objective = self.objective(effects)
+        if (some := on_some(objective)) is objective:
+            return self.polished(effects, start, evaluations)
+        there = polish(some, start, self._affordable(some, evaluations))
+        return on_all(objective, some, there, start, self._affordable(objective, evaluations))
+
+    def _affordable(self, objective: Objective, evaluations: int) -> int:
+        """So many, if the budget has them left; a search begins and ends with derivatives."""
+        left = max(1, (self.limit - self.count) // len(objective.recordings) - 2 * len(objective.space))
         self.cut_short |= left < evaluations
-        return polish(objective, start, min(evaluations, left))
+        return min(evaluations, left)
 
     def as_a_user_fits(self, candidate: Candidate) -> FloatArray:
         """Where a fit of the model with the candidate ends that leaves nothing to numerics: as ``muslin fit`` does it.
@@ -150,7 +166,7 @@ class Work:
         if key not in self._as_fitted:
             objective = Objective(
                 self.pool, candidate.space, self.problem.fit_on, self.fit.noise, self.offsets,
-                discrepancy=replace(self.discrepancy, directions={}),
+                discrepancy=replace(self.discrepancy, directions={}), smooth=self.problem.pieces > 1,
             )  # fmt: skip
             self._as_fitted[key] = polish(objective, candidate.fit.unit, USER_EVALUATIONS).unit
         return self._as_fitted[key]
@@ -165,6 +181,12 @@ class Work:
     ) -> Polished:
         """The same with few derivatives, see :func:`~..polish.polish`, and perhaps on some ``recordings`` only."""
         return polish(self.objective(effects, recordings), start, evaluations, known=known, roughly=True)
+
+    def roughly_searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
+        """The same, of many recordings to some; what it leaves is of all."""
+        quick = self.quick(effects)
+        found = polish(quick, start, evaluations, roughly=True)
+        return found if len(quick.recordings) == len(self.problem.fit_on) else self._again(effects, found)
 
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
         """Hold out, and put together what decides between candidates for the model that has ``effects``."""

@@ -13,11 +13,12 @@ from ..correlated_noise import correlated_noise
 from ..discrepancy import NONE, Discrepancy
 from ..noise import Noise
 from ..observe import Observer
-from ..polish import TOLD_APART, Objective, Polished, polish, polish_from, some_of
+from ..polish import TOLD_APART, Objective, Polished, polish, polish_from
 from ..residuals import Offsets, residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import roughness
 from ..secants import CHANCE
+from ..some import on_all, on_some
 from .draws import DrawStore
 from .ellipsoid import Ellipsoid
 from .narrowing import narrowed
@@ -108,11 +109,11 @@ class Polishing:
     def look_from(self, guesses: FloatArray) -> None:
         """Search from ``guesses (G, D)``, too, those that come nearest first, while the best fit leaves a misfit."""
         before = self._pool.count
-        some = _some_of(self.objective)
+        some = on_some(self.objective)
         whites, known = some.many(guesses), self.objective.part(self.best, some)
         nearest = np.argsort([np.inf if w is None else float(w @ w) for w in whites], kind="stable")
         best = polish_from(some, guesses[nearest], known)
-        if best is not known and (best := _on_all(self.objective, some, best)).rss < self.best.rss:
+        if best is not known and (best := on_all(self.objective, some, best)).rss < self.best.rss:
             self._study.progress("the estimator has found a better place than the draws", 0, 0)
             self._rest(self.objective, best)
         self.simulations += self._pool.count - before
@@ -133,10 +134,11 @@ class Polishing:
         discrepancy = roughness(self._pool, space, near, names).discrepancy(problem.recordings, self.noise, offsets)
         if discrepancy.nothing_counts(names):  # then the nearest is as good as it gets; doubts say that it is chance
             discrepancy = NONE
-        objective = Objective(self._pool, space, names, self.noise, offsets, discrepancy=discrepancy)
-        some = _some_of(objective)
+        smooth = problem.pieces > 1
+        objective = Objective(self._pool, space, names, self.noise, offsets, None, discrepancy, smooth)
+        some = on_some(objective)
         best = polish_from(some, np.concatenate([near[None], self._in_order(upto, discrepancy)[0]]))
-        self._rest(objective, _on_all(objective, some, best, near))
+        self._rest(objective, on_all(objective, some, best, near))
 
     def _rest(self, objective: Objective, best: Polished) -> None:
         """Go on from what a search has led to until it rests, and keep that."""
@@ -180,21 +182,3 @@ class Polishing:
                 total[k] += float(white @ white)
         order = np.argsort(total, kind="stable")
         return np.asarray(theta[order]), float(total[order[0]])
-
-
-def _some_of(objective: Objective) -> Objective:
-    """The same of as many recordings as are enough to search on, which is quicker where there are many."""
-    names = some_of(objective.recordings)
-    return objective.on(names) if names else objective
-
-
-def _on_all(objective: Objective, some: Objective, best: Polished, near: FloatArray | None = None) -> Polished:
-    """A fit to some recordings as one to all; with ``near (D,)``, no worse than there."""
-    if some is objective:
-        return best
-    start = best.unit
-    if near is not None:
-        rows = objective.many(np.stack([start, near]))
-        left = [np.inf if row is None else float(row @ row) for row in rows]
-        start = near if left[1] < left[0] else start
-    return polish(objective, start)

@@ -32,7 +32,7 @@ def response(name: str, strength: float) -> FloatArray:
 class Model:
     """Residuals of a model with ``effects`` against a measurement with tilt and slip."""
 
-    discrepancy = NONE
+    discrepancy, smooth = NONE, False
 
     def __init__(self, effects: tuple[str, ...]) -> None:
         self.effects = effects
@@ -67,10 +67,10 @@ class Bench:
     def space(self, effects: tuple[str, ...]) -> ParameterSpace:
         return Model(effects).space
 
-    def objective(self, effects: tuple[str, ...]) -> Model:
+    def quick(self, effects: tuple[str, ...]) -> Model:
         return Model(effects)
 
-    def roughly_polished(self, effects: tuple[str, ...], start: FloatArray, evaluations: int, known: None) -> Polished:
+    def roughly_searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         self.fits.append(effects)
         return polish(Model(effects), start, evaluations, roughly=True)  # type: ignore[arg-type]
 

@@ -11,7 +11,7 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference import polish as polishing
 from muslin.inference.discrepancy import Discrepancy
 from muslin.inference.noise import Noise
-from muslin.inference.polish import Objective, polish, polish_from, some_of
+from muslin.inference.polish import Objective, polish, polish_from
 from muslin.inference.residuals import Offsets
 from muslin.inference.secants import Found
 
@@ -19,9 +19,11 @@ from muslin.inference.secants import Found
 class Linear(Objective):
     """White residuals that are linear in two parameters; beyond ``wall`` of the first nothing can be simulated."""
 
+    by_derivatives = False
+
     def __init__(self, wall: float) -> None:
-        space = ParameterSpace((Parameter("a", "1", 0, 1), Parameter("b", "1", 0, 1)))
-        super().__init__(None, space, [], Noise(1.0, 0.0, "test", "m", 0.01), Offsets())  # type: ignore[arg-type]
+        space, noise = ParameterSpace(tuple(Parameter(n, "1", 0, 1) for n in "ab")), Noise(1.0, 0.0, "test", "m", 0.01)
+        super().__init__(None, space, [], noise, Offsets(), smooth=self.by_derivatives)  # type: ignore[arg-type]
         self.wall = wall
         self.matrix = np.random.default_rng(0).normal(size=(40, 2)) * 20
 
@@ -29,6 +31,12 @@ class Linear(Objective):
         return [None if u[0] > self.wall else self.matrix @ (u - np.array([0.4, 0.7])) for u in units]
 
 
+@pytest.fixture(params=[False, True], ids=["secants", "derivatives"])
+def either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Linear, "by_derivatives", request.param)
+
+
+@pytest.mark.usefixtures("either_way")
 def test_the_minimum_and_its_covariance() -> None:
     best = polish(Linear(2.0), np.array([0.1, 0.1]))
     np.testing.assert_allclose(best.unit, [0.4, 0.7], atol=1e-3)
@@ -46,6 +54,7 @@ def test_what_is_left_beyond_noise_counts_as_noise_and_never_as_less_than_the_pr
     assert np.linalg.eigvalsh(told).max() <= 1 / 12
 
 
+@pytest.mark.usefixtures("either_way")
 def test_whether_more_evaluations_would_gain_anything_is_told() -> None:
     assert polish(Linear(2.0), np.array([0.1, 0.1])).rested
     assert not polish(Bent(2.0), np.array([0.1, 0.9]), 5).rested
@@ -75,6 +84,7 @@ class TwoValleys(Linear):
         ]
 
 
+@pytest.mark.usefixtures("either_way")
 @pytest.mark.parametrize("left", [1.2, 5.0])
 def test_another_start_is_tried_where_the_first_leaves_a_misfit(left: float) -> None:
     starts = np.array([[0.9, 0.3], [0.88, 0.31], [0.2, 0.2], [0.1, 0.9]])
@@ -94,6 +104,7 @@ class Bent(Linear):
         return [np.concatenate([[300.0 * (u[1] - u[0] ** 2), 30.0 * (0.8 - u[0])], noise]) for u in units]
 
 
+@pytest.mark.usefixtures("either_way")
 def test_it_comes_to_the_bottom_of_a_narrow_valley() -> None:
     best = polish(Bent(2.0), np.array([0.1, 0.9]))
     floor = float(np.sum(np.random.default_rng(1).normal(size=40) ** 2))
@@ -113,6 +124,7 @@ class Missing(Linear):
         return [self.matrix @ (u + 0.3 * u**2 - np.array([0.4, 0.7])) + lacks for u in units]
 
 
+@pytest.mark.usefixtures("either_way")
 @pytest.mark.parametrize("start", [(0.1, 0.1), (0.9, 0.9), (0.5, 0.1), (0.3, 0.6)])
 def test_a_misfit_that_no_parameter_reaches_costs_no_long_search(start: tuple[float, float]) -> None:
     missing = Missing(2.0)
@@ -137,6 +149,7 @@ class Kink(Linear):
         return 8.0 + 80.0 * abs(a - 0.6) if a > 0.52 else 40.0 * abs(a - 0.4)
 
 
+@pytest.mark.usefixtures("either_way")
 def test_it_looks_around_from_a_kink_where_no_more_than_noise_is_left() -> None:
     kink = Kink()
     on_it = np.array([0.6, 0.7])
@@ -183,9 +196,3 @@ def test_rounds_end_where_one_gains_little_of_what_is_left(
     far.matrix = np.tile(far.matrix, (100, 1))
     assert polish(far, np.array([0.9, 0.1])).rested
     assert len(told) == 1 + rounds and set(told) == {4000.0}
-
-
-@pytest.mark.parametrize(("fitted", "some"), [(19, []), (25, [0, 3, 5, 8, 11, 13, 16, 19, 21, 24])])
-def test_many_recordings_are_searched_by_some_from_all_over(fitted: int, some: list[int]) -> None:
-    names = [f"take {k}" for k in range(fitted)]
-    assert some_of(names) == [names[k] for k in some]

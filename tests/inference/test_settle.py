@@ -42,7 +42,10 @@ class Bench:
     ) -> Polished:
         return self.polished(effects, start, evaluations)
 
-    def objective(self, effects: tuple[str, ...]) -> SimpleNamespace:
+    def roughly_searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
+        return self.polished(effects, start, evaluations)
+
+    def quick(self, effects: tuple[str, ...]) -> SimpleNamespace:
         return SimpleNamespace(many=lambda points: [np.ones(3) for _ in points])
 
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:

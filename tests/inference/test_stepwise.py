@@ -37,7 +37,7 @@ class Bench:
         names = ["stiffness", *(f"{e}.strength" for e in effects)]
         return ParameterSpace(tuple(Parameter(n, "1", 0, 1) for n in names))
 
-    def polished(self, effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
+    def searched(self, effects: tuple[str, ...], unit: FloatArray, evaluations: int) -> Polished:
         assert len(unit) == len(self.space(effects))
         white = np.full(int(COUNT), np.sqrt(self.left[effects] / COUNT))
         return Polished(unit, white, np.zeros((len(white), len(unit))), np.eye(len(unit)), COUNT)
@@ -61,9 +61,9 @@ def found(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> tu
             return first_stage({"tilt": alone, "wind": alone + 1.0, "drag": 8 * COUNT})
         if len(effects) > 1:  # nothing more is missing
             e = evidence(with_tilt, candidate("mass", with_tilt))
-            return Stage(effects, bench.polished(("tilt", "drag"), start, 1), {}, e, Decision("no-misfit", ()))
+            return Stage(effects, bench.searched(("tilt", "drag"), start, 1), {}, e, Decision("no-misfit", ()))
         space = bench.space((*effects, "drag"))
-        fit = bench.polished((*effects, "drag"), np.full(3, 0.5), 1)
+        fit = bench.searched((*effects, "drag"), np.full(3, 0.5), 1)
         drag = Candidate("drag", space, 2, fit, {"other": 0.003}, request.param[4], refitted=True)
         e = evidence(alone, drag)
         named = Decision("named", ("drag",)) if with_tilt < 0.95 * alone else Decision("none", ())
@@ -158,7 +158,7 @@ def paired(monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> t
     first = first_stage(alone)
 
     def both() -> Candidate:
-        fit = bench.polished(("x", "y"), np.array([0.5, 0.3, 0.7]), 1)
+        fit = bench.searched(("x", "y"), np.array([0.5, 0.3, 0.7]), 1)
         return Candidate("tilt", bench.space(("grasp", "tilt")), 2, fit, {"other": 0.003}, 1.0, refitted=True)
 
     bench.left["x", "y"] = together

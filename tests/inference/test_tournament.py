@@ -26,7 +26,7 @@ def bench(polished: Callable[..., Polished]) -> tuple[SimpleNamespace, Tournamen
     work = SimpleNamespace(
         study=SimpleNamespace(config=config, progress=lambda *_: None), starts=np.full((2, 1), 0.5),
         count=0, limit=1000, cut_short=False, problem=SimpleNamespace(fit_on=["a"]),
-        polished=polished, roughly_polished=polished,
+        searched=polished, roughly_polished=polished,
     )  # fmt: skip
     work.may_go_on = lambda until=np.inf: Work.may_go_on(work, until)  # type: ignore[arg-type]
     return work, Tournament(work, (), plain, {"drag": look}, {})  # type: ignore[arg-type]

@@ -46,8 +46,8 @@ def test_the_told_fit_is_not_left_where_numerics_may_explain_it() -> None:
     pool = Pool()
     numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
     work = SimpleNamespace(
-        pool=pool, problem=SimpleNamespace(fit_on=("r",)), fit=SimpleNamespace(noise=NOISE), offsets=Offsets(),
-        discrepancy=numerics, _as_fitted={},
+        pool=pool, problem=SimpleNamespace(fit_on=("r",), pieces=1), fit=SimpleNamespace(noise=NOISE),
+        offsets=Offsets(), discrepancy=numerics, _as_fitted={},
     )  # fmt: skip
     beside = polish(Objective(pool, SPACE, ("r",), NOISE, Offsets(), discrepancy=numerics), np.array([0.8]), 8)  # type: ignore[arg-type]
     assert abs(beside.unit[0] - BEST) > 0.1
@@ -68,8 +68,8 @@ def test_a_misfit_that_numerics_do_not_explain_casts_doubt_on_what_they_take_off
     space = ParameterSpace((Parameter("drag.a", "1", 0.0, 1.0),))
     numerics = Discrepancy({"r": 10.0 * (WAVE + OTHER).reshape(-1, 1) / NOISE.sd})
     work = SimpleNamespace(
-        pool=pool, problem=SimpleNamespace(fit_on=("r",)), fit=SimpleNamespace(noise=NOISE), offsets=Offsets(),
-        discrepancy=numerics, _as_fitted={}, _effects_of=lambda candidate: (),
+        pool=pool, problem=SimpleNamespace(fit_on=("r",), pieces=1), fit=SimpleNamespace(noise=NOISE),
+        offsets=Offsets(), discrepancy=numerics, _as_fitted={}, _effects_of=lambda candidate: (),
         objective=lambda effects: Objective(pool, space, ("r",), NOISE, Offsets(), discrepancy=numerics),  # type: ignore[arg-type]
     )  # fmt: skip
     work._again, work.as_a_user_fits = partial(Work._again, work), partial(Work.as_a_user_fits, work)
