@@ -36,6 +36,6 @@ def on_all(
         return best
     start = best.unit
     if near is not None:
-        left = [np.inf if row is None else float(row @ row) for row in objective.many(np.stack([best.unit, near]))]
-        start = near if left[1] < left[0] else start
+        there, here = (float(w @ w) for w in (objective.one(near), objective.one(start)))
+        start = near if there < here else start
     return polish(objective, start, evaluations)
