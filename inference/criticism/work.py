@@ -183,7 +183,7 @@ class Work:
         return polish(self.objective(effects, recordings), start, evaluations, known=known, roughly=True)
 
     def roughly_searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
-        """The same, of many recordings to some; what it leaves is of all."""
+        """The same, of many recordings to some: what it leaves is of all, its derivatives are of these."""
         quick = self.quick(effects)
         found = polish(quick, start, evaluations, roughly=True)
         return found if len(quick.recordings) == len(self.problem.fit_on) else self._again(effects, found)
