@@ -12,7 +12,11 @@ from valleys import NAMES, SEEN, Valleys
 from muslin.core.arrays import FloatArray
 from muslin.core.measurement import Measurement
 from muslin.core.study import Study
+from muslin.inference.criticism.work import Work
+from muslin.inference.discrepancy import Discrepancy
+from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective, Polished, polish
+from muslin.inference.residuals import Offsets
 from muslin.inference.sequential import polishing
 from muslin.inference.sequential.polishing import Polishing
 from muslin.inference.some import some_of
@@ -62,3 +66,32 @@ def test_a_fit_of_many_takes_is_searched_on_some_and_ends_on_all(
     assert np.all(np.abs(fit.estimate - truth) < 4 * fit.sd), (fit.estimate, fit.sd)
     on_two = Study.load(write_study(tmp_path / "two", Measurement((*takes[:2], other))), workers=0).fit()
     assert np.all(fit.sd < 0.5 * on_two.sd)  # ten times as much tells it
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_pieces_of_a_take_are_smooth_and_whole_takes_may_not_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cut: bool
+) -> None:
+    pytest.importorskip("mujoco")
+    study = Study.load(write_study(tmp_path, small_measurement()), workers=0)
+    if cut:
+        cut_from = dict.fromkeys([*study.problem.fit_on, "more"], "whole")
+        study.__dict__["problem"] = replace(study.problem, cut_from=cut_from)
+    told: list[bool] = []
+
+    class Noted(Exception):
+        pass
+
+    def noted(objective: Objective, starts: FloatArray, best: Polished | None = None) -> Polished:
+        told.append(objective.smooth)
+        raise Noted
+
+    monkeypatch.setattr(polishing, "polish_from", noted)
+    with pytest.raises(Noted):
+        study.fit()
+    work = SimpleNamespace(
+        pool=None, problem=study.problem, space=lambda effects: study.problem.space, offsets=Offsets(),
+        fit=SimpleNamespace(noise=Noise(1.0, 0.0, "test", "m", 0.01)), discrepancy=Discrepancy(),
+    )  # fmt: skip
+    told += [Work.objective(work, ()).smooth, Work.objective(work, (), ["a"]).on(["b"]).smooth]  # type: ignore[arg-type]
+    assert told == [cut] * 3
