@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.arrays import FloatArray
 from ..polish import Objective, Polished
-from ..some import some_of
+from ..subset import some_of
 from .candidate import Candidate, best_starts, screening_points
 from .linear import Look, least_square
 from .verdict import EXPLAINS

@@ -16,7 +16,7 @@ from ..roughness import Roughness, check_repeatable, roughness
 from ..sequential.polishing import offsets_of
 from ..sequential.result import FitResult
 from ..sequential.together import told_together
-from ..some import on_all, on_some
+from ..subset import on_all, on_some
 from .candidate import Candidate, root_mean_square
 from .held_out import HeldOut, held_out_residuals
 from .numerics import numerics
@@ -184,9 +184,10 @@ class Work:
 
     def roughly_searched(self, effects: tuple[str, ...], start: FloatArray, evaluations: int) -> Polished:
         """The same, of many recordings to some: what it leaves is of all, its derivatives are of these."""
-        quick = self.quick(effects)
-        found = polish(quick, start, evaluations, roughly=True)
-        return found if len(quick.recordings) == len(self.problem.fit_on) else self._again(effects, found)
+        objective = self.objective(effects)
+        some = on_some(objective)
+        found = polish(some, start, evaluations, roughly=True)
+        return found if some is objective else self._again(effects, found)
 
     def evidence(self, effects: tuple[str, ...], plain: Polished, candidates: Sequence[Candidate]) -> Evidence:
         """Hold out, and put together what decides between candidates for the model that has ``effects``."""

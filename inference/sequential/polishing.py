@@ -18,7 +18,7 @@ from ..residuals import Offsets, residual
 from ..rough_curvature import seen_past_chance
 from ..roughness import roughness
 from ..secants import CHANCE
-from ..some import on_all, on_some
+from ..subset import on_all, on_some
 from .draws import DrawStore
 from .ellipsoid import Ellipsoid
 from .narrowing import narrowed

@@ -6,7 +6,7 @@ from test_polish import Bent, Kink, Linear
 
 from muslin.core.arrays import FloatArray
 from muslin.core.parameters import Parameter, ParameterSpace
-from muslin.inference.descent import descend
+from muslin.inference.descent import _updated, descend
 from muslin.inference.polish import polish
 from muslin.inference.secants import Found
 
@@ -87,3 +87,52 @@ def test_a_kink_is_no_rest() -> None:
     kink = Kink()
     found, _, rested = found_by(kink, np.array([0.65, 0.6]))
     assert not rested and found.unit[0] == pytest.approx(0.6, abs=0.005)  # where secants look around
+
+
+def test_derivatives_are_not_taken_anew_while_steps_come_true() -> None:
+    """Three steps to the minimum of a linear problem, as far as they may go, and derivatives at both its ends."""
+    linear = Linear(2.0)
+    asked = list[FloatArray]()
+
+    def derivatives(unit: FloatArray, white: FloatArray) -> FloatArray:
+        asked.append(unit)
+        return linear.matrix
+
+    start = np.array([0.95, 0.7])
+    at = Found(start, linear.one(start), np.zeros((40, 2)))
+    found, used, rested = descend(linear.many, derivatives, at, 60, enough=0.01, least=0.002)
+    assert rested and found.unit == pytest.approx([0.4, 0.7], abs=1e-6)
+    assert used > 2 * 2 + 2 and len(asked) == 2
+
+
+def test_what_a_step_did_is_in_the_derivatives_behind_it() -> None:
+    winding, start, step = Winding(True), np.full(6, 0.5), np.linspace(-0.02, 0.03, 6)
+    white = winding.one(start)
+    at = Found(start, white, winding.jacobian(start, white))
+    behind = _updated(at, step, winding.one(start + step))
+    np.testing.assert_allclose(behind.jacobian @ step, behind.white - white, atol=1e-9)
+    across = np.array([0.03, 0.0, 0.0, 0.0, 0.0, 0.02])  # of which the step tells nothing
+    np.testing.assert_allclose(behind.jacobian @ across, at.jacobian @ across, atol=1e-9)
+
+
+class Lacking(Bent):
+    """A bent valley, and residuals that no parameter reaches."""
+
+    def many(self, units: FloatArray) -> list[FloatArray | None]:
+        return [np.append(row, np.full(4000, 2.5)) for row in super().many(units) if row is not None]
+
+
+@pytest.mark.parametrize("as_noise", [False, True])
+def test_what_gains_little_beside_what_is_left_is_gone_after_once(as_noise: bool) -> None:
+    lacking, start = Lacking(2.0), np.array([0.75, 0.57])
+    white = lacking.one(start)
+    at = Found(start, white, lacking.jacobian(start, white))
+    noise = float(white[42:] @ white[42:]) + 40.0 if as_noise else 0.0
+    steps = list[FloatArray]()
+
+    def many(units: FloatArray) -> list[FloatArray | None]:
+        steps.extend(units)
+        return lacking.many(units)
+
+    _, _, rested = descend(many, lacking.jacobian, at, 60, enough=1e-9, least=1e-4, noise=noise, known=True)
+    assert rested and (len(steps) > 1) == as_noise

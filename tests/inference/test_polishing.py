@@ -19,7 +19,7 @@ from muslin.inference.polish import Objective, Polished, polish
 from muslin.inference.residuals import Offsets
 from muslin.inference.sequential import polishing
 from muslin.inference.sequential.polishing import Polishing
-from muslin.inference.some import some_of
+from muslin.inference.subset import some_of
 
 
 @pytest.mark.parametrize(("elsewhere", "kept"), [(1.0, True), (9.0, False)])

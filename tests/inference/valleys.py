@@ -7,7 +7,7 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.inference.noise import Noise
 from muslin.inference.polish import Objective
 from muslin.inference.residuals import Offsets
-from muslin.inference.some import some_of
+from muslin.inference.subset import some_of
 
 NAMES = [str(k) for k in range(20)]
 SEARCHED = some_of(NAMES)

@@ -9,7 +9,7 @@ from valleys import NAMES, SEEN, Valleys
 
 from muslin.inference.criticism.work import Work
 from muslin.inference.polish import polish
-from muslin.inference.some import on_all, on_some, some_of
+from muslin.inference.subset import on_all, on_some, some_of
 
 
 @pytest.mark.parametrize(("fitted", "some"), [(19, []), (25, [0, 3, 5, 8, 11, 13, 16, 19, 21, 24])])
