@@ -1,18 +1,19 @@
 """Grasps that are not rigid: they give way under load, or slip."""
 
+import math
 from abc import abstractmethod
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.arrays import FloatArray, cross
 from ...core.effect import Effect, GraspShift
 from ...core.material import Material
 from ...core.parameters import Parameter
 from ...core.scene import Scene
 from ...core.simulator import State
-from .grip_load import GripLoad
+from .grip_load import BendingPull, GripLoad
 
 #: Creep at twice the load that a grasp holds [m/s].
 CREEP_SPEED = 0.1
@@ -44,6 +45,7 @@ class _SoftGrasp(Effect):
         if not loads:
             return None
         shifts = [np.zeros((2, 6)) for _ in loads]  # where each is, and its last move
+        pull = BendingPull(scene) if scene.body.kind == "rope" else None
         last: float | None = None
 
         def shift(time: float, state: State, target: FloatArray) -> FloatArray:
@@ -51,9 +53,10 @@ class _SoftGrasp(Effect):
             step = 0.0 if last is None else time - last
             last = time
             out = target.copy()
+            bent = pull(state.positions) if pull is not None and step > 0 else None
             for (load, rows), moved in zip(loads, shifts, strict=True):
                 if step > 0:
-                    force, stiffness = load(state.positions, step)
+                    force, stiffness = load(state.positions, step, bent)
                     moved[1] = self.give(force + stiffness @ moved[1], stiffness, moved[0], step)
                     moved[0] += moved[1]
                 out[rows] = _moved(target[rows], moved[0])
@@ -104,8 +107,9 @@ class GraspCompliance(_SoftGrasp):
         return self.values["compliance"] / 1e-4 + self.values["turn_compliance"] / 10.0
 
     def give(self, force: FloatArray, stiffness: FloatArray, moved: FloatArray, step: float) -> FloatArray:
-        c = np.repeat([self.values["compliance"], self.values["turn_compliance"]], 3)
-        matrix = np.eye(6) * (1.0 + PAD_TIME / step) + c[:, None] * stiffness
+        c = np.array(3 * [self.values["compliance"]] + 3 * [self.values["turn_compliance"]])
+        matrix = c[:, None] * stiffness
+        matrix.flat[::7] += 1.0 + PAD_TIME / step
         return np.asarray(np.linalg.solve(matrix, c * force - moved))
 
 
@@ -143,12 +147,10 @@ class GraspSlip(_SoftGrasp):
 
 def _moved(points: FloatArray, moved: FloatArray) -> FloatArray:
     """``points (H, 3)`` [m] of a grasp displaced by ``moved (6,)`` [m, rad] about their centre."""
-    angle = float(np.linalg.norm(moved[3:]))
+    angle = math.hypot(*moved[3:].tolist())
     if angle == 0.0:
         return np.asarray(points + moved[:3])
-    centre = points.mean(axis=0)
-    arm, axis = points - centre, moved[3:] / angle
-    turned = (
-        np.cos(angle) * arm + np.sin(angle) * np.cross(axis, arm) + (1 - np.cos(angle)) * (arm @ axis)[:, None] * axis
-    )
+    centre = points.sum(axis=0) / len(points)
+    arm, axis = points - centre, moved[None, 3:] / angle
+    turned = math.cos(angle) * arm + math.sin(angle) * cross(axis, arm) + (1 - math.cos(angle)) * (arm @ axis.T) * axis
     return np.asarray(centre + turned + moved[:3])

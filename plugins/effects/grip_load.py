@@ -9,12 +9,17 @@ from ...core.scene import Scene
 from .crease import bending_rigidity
 from .stretch import rest_shape
 
+#: How points move along and, per arm, about the axes x, y, z: the identity, and -e_ijk with the arm first.
+_ALONG = np.eye(3)
+_ABOUT = np.cross(_ALONG[None, :], _ALONG[:, None]).swapaxes(1, 2).reshape(3, 9)
+
 
 class GripLoad:
     """Force and torque of the object on one gripper, and how they fall when the grasp gives way.
 
     The elements that touch the grasp are Saint Venant-Kirchhoff triangles of the scene's material, or segments of a
-    rope with its bending; the weight of the held vertices comes on top. Their inertia is left out.
+    rope; its bending (:class:`BendingPull`, which all grasps share) and the weight of the held vertices come on top.
+    Their inertia is left out.
 
     Args:
         scene: of cloth or rope.
@@ -35,9 +40,7 @@ class GripLoad:
         material, body = scene.material, scene.body
         self._rope = isinstance(material, RopeMaterial)
         if isinstance(material, RopeMaterial):
-            self._bending, self._rigidity = bending_of(body, scene.held), bending_rigidity(material)
-            self._bending.follow(scene.start_positions)
-            self._bends = _stiffest_motions(scene, held, self._rigidity)
+            self._bends = _stiffest_motions(scene, held, bending_rigidity(material))
             self._moduli = np.array([[material.stretch_stiffness]])
         else:
             assert isinstance(material, ClothMaterial)
@@ -48,28 +51,35 @@ class GripLoad:
         heaviest = np.where(inside, 0.0, masses[self._elements]).max(axis=1)
         self._answer = 2.0 * np.sqrt(heaviest / springs)
 
-    def __call__(self, positions: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
+    def __call__(
+        self, positions: FloatArray, step: float, bent: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Load and stiffness of the grasp, when its vertices are at those of ``positions (V, 3)`` [m].
 
         An element whose free vertex of mass m answers faster than the step h, at sqrt(k / m) > 2 / h, resists as
         its wave impedance sqrt(k m) does: 2 sqrt(k m) / h instead of k.
+
+        Args:
+            positions: of all vertices [m].
+            step: h [s].
+            bent: forces of the bending on all vertices ``(V, 3)`` [N], for a rope.
 
         Returns:
             Force and torque about the centre of the grasp ``(6,)`` [N, N m], and by how much they fall per
             displacement and turn of it within ``step`` [s] ``(6, 6)``.
         """
         points = positions[self._held]
-        motions = _motions(points - points.mean(axis=0))
+        motions = _motions(points - points.sum(axis=0) / len(points))
         corners = positions[self._elements]
         moves = self._inside * motions[self._rows]
         strain, rates = self._segments(corners, moves) if self._rope else self._triangles(corners, moves)
         weighted = self._measures[:, None, None] * (self._moduli @ rates)
         force = -np.einsum("ek,ekm->m", strain, weighted)
-        stiffness = np.einsum("ekm,ekn,e->mn", rates, weighted, np.minimum(1.0, self._answer / step))
+        weighted *= np.minimum(1.0, self._answer / step)[:, None, None]
+        stiffness = rates.reshape(-1, 6).T @ weighted.reshape(-1, 6)
         outer = self._weight
         if self._rope:
-            self._bending.follow(positions)
-            bent = self._bending.forces(self._rigidity * (self._bending.curvature - self._bending.rest))
+            assert bent is not None
             outer = outer + bent[self._held]
             stiffness = stiffness + self._bends
         return force + np.einsum("hx,hxm->m", outer, motions), stiffness
@@ -77,7 +87,7 @@ class GripLoad:
     def _segments(self, corners: FloatArray, moves: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Strain ``(E, 1)`` and how it answers to the motions of the grasp ``(E, 1, 6)``."""
         apart = corners[:, 1] - corners[:, 0]
-        length = np.linalg.norm(apart, axis=1)
+        length = np.sqrt(dot(apart, apart))
         rates = np.einsum("ex,exm->em", apart / (length * self._measures)[:, None], moves[:, 1] - moves[:, 0])
         return (length / self._measures - 1.0)[:, None], rates[:, None]
 
@@ -92,14 +102,28 @@ class GripLoad:
         return strain, np.stack([rates[0], rates[1], rates[2] + rates[3]], axis=1)
 
 
+class BendingPull:
+    """Nodal forces of the bending of a rope, followed from where it starts.
+
+    Args:
+        scene: of a rope.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._bending, self._rigidity = bending_of(scene.body, scene.held), bending_rigidity(scene.material)
+        self._bending.follow(scene.start_positions)
+
+    def __call__(self, positions: FloatArray) -> FloatArray:
+        """Forces ``(V, 3)`` [N] on the vertices, which are now at ``positions (V, 3)`` [m]."""
+        self._bending.follow(positions)
+        return self._bending.forces(self._rigidity * (self._bending.curvature - self._bending.rest))
+
+
 def _motions(arms: FloatArray) -> FloatArray:
     """How vertices at ``arms (H, 3)`` from the centre of a grasp move with it ``(H, 3, 6)``: along, about x, y, z."""
-    x, y, z = arms.T
-    out = np.zeros((len(arms), 3, 6))
-    out[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    out[:, 0, 4], out[:, 0, 5] = z, -y
-    out[:, 1, 3], out[:, 1, 5] = -z, x
-    out[:, 2, 3], out[:, 2, 4] = y, -x
+    out = np.empty((len(arms), 3, 6))
+    out[:, :, :3] = _ALONG
+    out[:, :, 3:] = (arms @ _ABOUT).reshape(-1, 3, 3)
     return out
 
 
