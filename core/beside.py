@@ -163,14 +163,15 @@ def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArr
     tangents = _unit(np.concatenate([along[:, :1], along[:, 1:] + along[:, :-1], along[:, -1:]], axis=1))
     up = np.array([0.0, 0.0, 1.0])
     first, last = (rotate(poses[:, g, 3:], np.broadcast_to(up, (len(poses), 3))) for g in (0, 1))
-    carried = np.empty_like(tangents)
-    carried[:, 0] = _across(first, tangents[:, 0])
+    # Angles are kept along the way, so it is that of any axis, vertex by vertex, that is carried on to the next one.
+    any_axis = _across(np.eye(3)[np.abs(tangents).argmin(axis=2)], tangents)
+    other = np.cross(tangents, any_axis)
     sums = tangents[:, :-1] + tangents[:, 1:]
     steep = 1.0 / np.maximum(1.0 + dot(tangents[:, :-1], tangents[:, 1:]), 1e-9)
-    for k in range(1, tangents.shape[1]):
-        axis, new = carried[:, k - 1], tangents[:, k]
-        bend = dot(axis, new) * steep[:, k - 1]
-        carried[:, k] = _across(axis - bend[:, None] * sums[:, k - 1], new)
+    moved = any_axis[:, :-1] - (dot(any_axis[:, :-1], tangents[:, 1:]) * steep)[..., None] * sums
+    moved = np.concatenate([first[:, None], moved], axis=1)
+    turns = np.cumsum(np.arctan2(dot(moved, other), dot(moved, any_axis)), axis=1)[..., None]
+    carried = np.cos(turns) * any_axis + np.sin(turns) * other
     beside = np.cross(tangents, carried)
     wanted = _across(last, tangents[:, -1])
     angle = np.arctan2(np.sum(wanted * beside[:, -1], axis=1), np.sum(wanted * carried[:, -1], axis=1))
@@ -202,7 +203,7 @@ def curves(points: FloatArray, fine: int = 6) -> tuple[FloatArray, IntArray]:
 
 
 def _across(vectors: FloatArray, tangents: FloatArray) -> FloatArray:
-    return _unit(vectors - dot(vectors, tangents)[:, None] * tangents)
+    return _unit(vectors - dot(vectors, tangents)[..., None] * tangents)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

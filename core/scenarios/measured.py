@@ -167,14 +167,16 @@ def _polynomials(time: FloatArray, points: FloatArray, degree: int) -> tuple[Flo
     """
     out, left = np.full((2, points.shape[1], 3), np.nan), []
     scale = np.array([1.0, 1.0, 0.5, 1.0 / 6.0])[: degree + 1]
-    for p in range(points.shape[1]):
-        seen = np.isfinite(points[:, p]).all(axis=1)
+    all_rows = scale * np.vander(time, degree + 1, increasing=True)
+    patterns, which = np.unique(np.isfinite(points).all(axis=2), axis=1, return_inverse=True)
+    for p, seen in enumerate(patterns.T):  # markers that are seen in the same frames
         if seen.sum() < degree + 3:
             continue
-        rows = scale * np.vander(time[seen], degree + 1, increasing=True)
-        solved = np.linalg.lstsq(rows, points[seen, p], rcond=None)[0]
-        out[:, p] = solved[1:3]
-        left.append(np.sum((points[seen, p] - rows @ solved) ** 2) / (3 * (seen.sum() - degree - 1)))
+        own = np.flatnonzero(which.ravel() == p)
+        rows, right = all_rows[seen], points[seen][:, own].reshape(seen.sum(), -1)
+        solved = np.linalg.lstsq(rows, right, rcond=None)[0]
+        out[:, own] = solved[1:3].reshape(2, -1, 3)
+        left += [np.sum((right - rows @ solved) ** 2) / (right.shape[1] * (seen.sum() - degree - 1))] * len(own)
     return out, float(np.sqrt(np.mean(left))) if left else 0.0
 
 
