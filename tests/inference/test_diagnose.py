@@ -91,7 +91,7 @@ def test_of_many_takes_the_same_is_named(tmp_path: Path) -> None:
     drag = AirDrag(drag_coefficient=1.2)
     takes = [replace(r, name=f"{r.name} {k}") for k in range(10) for r in small_measurement(drag, seed=k).recordings]
     others = [r.name for r in takes if r.name.startswith("other")]
-    study = Study.load(write_study(tmp_path, Measurement(tuple(takes)), hold_out=others))
+    study = Study.load(write_study(tmp_path, Measurement(tuple(takes)), hold_out=others), workers=0)
     study.config.diagnose.candidates = ["actuator-lag", "air-drag", "gravity-tilt", "viscous-damping"]
     study.fit()
     found = study.diagnose().result
@@ -105,7 +105,7 @@ def test_of_many_takes_the_same_is_named(tmp_path: Path) -> None:
 def test_what_makes_a_users_held_out_error_larger_is_not_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As nothing that is right does so, the errors are made up."""
     monkeypatch.setattr(BeforeAfter, "error", lambda self, names: (0.003, 0.004))
-    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))))
+    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))), workers=0)
     study.config.diagnose.candidates = ["air-drag"]
     study.fit()
     result = study.diagnose().result
@@ -117,7 +117,7 @@ def test_what_makes_a_users_held_out_error_larger_is_not_named(tmp_path: Path, m
 @pytest.mark.slow
 def test_two_effects_at_once_are_both_named(tmp_path: Path) -> None:
     hidden = (AirDrag(drag_coefficient=1.2), ActuatorLag(time_constant=0.05))
-    study = Study.load(write_study(tmp_path, small_measurement(*hidden)))
+    study = Study.load(write_study(tmp_path, small_measurement(*hidden)), workers=0)
     study.config.diagnose.candidates = ["air-drag", "actuator-lag", "gravity-tilt", "hem"]
     study.fit()
     result = study.diagnose().result
@@ -129,7 +129,7 @@ def test_two_effects_at_once_are_both_named(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_small_budget_still_gives_a_ranking(tmp_path: Path) -> None:
-    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))))
+    study = Study.load(write_study(tmp_path, small_measurement(AirDrag(drag_coefficient=1.2))), workers=0)
     study.config.diagnose.simulations = 150
     study.fit()
     result = study.diagnose().result
@@ -159,7 +159,7 @@ def test_the_same_study_runs_on_the_other_engine_by_changing_one_word(tmp_path: 
     text = path.read_text()
     assert text.count('"mujoco"') == 1
     path.write_text(text.replace('"mujoco"', '"pybullet"').replace("time_step = 0.01", "time_step = 0.005"))
-    study = Study.load(path)
+    study = Study.load(path, workers=0)
     study.fit()
     row = study.compare().rows[0]
     assert np.isfinite(row.rmse)

@@ -80,7 +80,7 @@ def test_with_tails_what_goes_another_way_does_not_lead_the_fit(
         config = read_config(path)
         config.noise.sd, config.noise.tails = 0.001, tails
         write_config(config, path)
-        study = Study.load(path, workers=1)
+        study = Study.load(path, workers=0)
         off[tails] = np.abs(np.log(study.fit().estimate / truth))
         assert not study.compare().adequate
     assert set(held_against) == {None}  # it compares by squares, whatever the fit goes by
@@ -119,7 +119,7 @@ def test_pieces_of_a_recording_count_as_one_simulation(
 def test_a_finished_fit_is_returned_and_not_run_again(small_study: Study) -> None:
     first = small_study.fit()
     began = time.monotonic()
-    again = Study.load(small_study.path, workers=1).fit()
+    again = Study.load(small_study.path, workers=0).fit()
     assert time.monotonic() - began < 1.0
     np.testing.assert_array_equal(first.samples, again.samples)
 
@@ -137,7 +137,7 @@ def test_one_and_two_workers_give_the_same_posterior(tmp_path: Path) -> None:
 def test_another_seed_gives_other_draws(tmp_path: Path) -> None:
     measurement = small_measurement()
     samples = [
-        Study.load(write_study(tmp_path / str(seed), measurement, seed=seed), workers=1).fit().samples
+        Study.load(write_study(tmp_path / str(seed), measurement, seed=seed), workers=0).fit().samples
         for seed in (0, 1)
     ]
     assert not np.array_equal(samples[0], samples[1])
@@ -148,7 +148,7 @@ def test_another_seed_gives_other_draws(tmp_path: Path) -> None:
 def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -> None:
     """kill -9 in the first and in the second round; the draws that were there are not simulated again."""
     measurement = small_measurement()
-    whole = Study.load(write_study(tmp_path / "whole", measurement), workers=1).fit()
+    whole = Study.load(write_study(tmp_path / "whole", measurement), workers=0).fit()
     path = write_study(tmp_path / "killed", measurement)
     errors, passing = tmp_path / "errors", tmp_path / "passing"
     passing.mkdir()
@@ -171,7 +171,7 @@ def test_a_killed_fit_goes_on_with_the_same_result(tmp_path: Path, after: int) -
     done = {f.name: f.stat().st_mtime_ns for f in status.glob("*") if f.name.isdigit()}
     with pytest.raises(StepMissingError):
         Study.load(path).step_results("fit")
-    continued = Study.load(path, workers=1).fit()
+    continued = Study.load(path, workers=0).fit()
     np.testing.assert_array_equal(continued.samples, whole.samples)
     np.testing.assert_array_equal(continued.estimate, whole.estimate)
     assert len(done) >= after
@@ -196,7 +196,7 @@ def test_results_open_in_xarray_with_units(small_study: Study) -> None:
 def test_a_changed_study_is_fitted_anew(small_study: Study) -> None:
     small_study.fit()
     before = read(small_study.step_results("fit"), "estimate")
-    changed = Study.load(small_study.path, workers=1)
+    changed = Study.load(small_study.path, workers=0)
     changed.config.material["areal_density"] = 0.3
     after = changed.fit()
     assert not np.allclose(before, after.estimate, rtol=1e-3)
@@ -208,7 +208,7 @@ def test_a_changed_measurement_is_fitted_anew(small_study: Study) -> None:
     small_study.fit()
     before = read(small_study.step_results("fit"), "estimate")
     save_measurement(small_measurement(seed=5), small_study.measurement_path, overwrite=True)
-    after = Study.load(small_study.path, workers=1).fit()
+    after = Study.load(small_study.path, workers=0).fit()
     assert not np.array_equal(before, after.estimate)
 
 
@@ -220,7 +220,7 @@ def test_steps_say_what_is_missing(small_study: Study) -> None:
 def test_results_of_an_earlier_state_of_the_study_are_not_used(small_study: Study) -> None:
     small_study.fit()
     small_study.compare()
-    changed = Study.load(small_study.path, workers=1)
+    changed = Study.load(small_study.path, workers=0)
     changed.config.study.hold_out = []
     changed.config.study.fit_on = ["near", "far"]
     changed.step_results("fit")  # does not depend on what is held out
@@ -228,7 +228,7 @@ def test_results_of_an_earlier_state_of_the_study_are_not_used(small_study: Stud
         changed.step_results("compare")
     changed.config.material["areal_density"] = 0.3
     with pytest.raises(StepMissingError, match="muslin fit"):
-        Study(changed.config, changed.path, workers=1).compare()
+        Study(changed.config, changed.path, workers=0).compare()
 
 
 def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(
@@ -237,11 +237,11 @@ def test_a_wrong_estimator_option_is_said_before_anything_is_simulated(
     config = small_study.config.model_copy(deep=True)
     config.estimator = config.estimator.model_validate({"name": "bayessim-rkhs", "no_such_option": 1})
     with pytest.raises(InputError, match="no_such_option"):
-        Study(config, small_study.path, workers=1).fit()
+        Study(config, small_study.path, workers=0).fit()
     monkeypatch.setitem(REGISTRY._objects, ("estimator", "own"), lambda *, width=3, correspondence=True: None)
     config.estimator = config.estimator.model_validate({"name": "own", "widht": 1})
     with pytest.raises(InputError, match=r"'own' has no option 'widht'\. Did you mean 'width'\? Options: width, corr"):
-        Study(config, small_study.path, workers=1).fit()
+        Study(config, small_study.path, workers=0).fit()
     assert not small_study.results_path.exists()
 
 
@@ -250,7 +250,7 @@ def test_a_damaged_store_is_one_clear_error(small_study: Study, what: str) -> No
     small_study.fit()
     (small_study.results_path / what).write_bytes(b"not what was written")
     with pytest.raises(StoreError, match="damaged"):
-        Study.load(small_study.path, workers=1).compare()
+        Study.load(small_study.path, workers=0).compare()
 
 
 @pytest.mark.slow

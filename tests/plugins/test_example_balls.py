@@ -26,12 +26,12 @@ BALLS = {
 }
 
 
-def study_of(ball: str, folder: Path, workers: int = 0) -> Study:
+def study_of(ball: str, folder: Path) -> Study:
     for name in (f"{ball}.toml", f"{ball}.vtk"):
         (folder / name).write_bytes((FOLDER / name).read_bytes())
     takes = REGISTRY.get("dataset", "balls")(FOLDER / "drops.csv", [])
     save_measurement(Measurement(tuple(takes)), folder / "balls.zarr", overwrite=True)
-    return Study.load(folder / f"{ball}.toml", workers=workers)
+    return Study.load(folder / f"{ball}.toml", workers=0)
 
 
 @pytest.mark.parametrize("ball", sorted(BALLS))
@@ -80,7 +80,7 @@ def test_the_air_is_found_on_a_whiffle_ball_and_not_on_a_bowling_ball(tmp_path: 
     pytest.importorskip("torch")
     pytest.importorskip("mujoco")
     pytest.importorskip("meshio")
-    light, heavy = study_of("whiffle", tmp_path, workers=1), study_of("bowling", tmp_path, workers=1)
+    light, heavy = study_of("whiffle", tmp_path), study_of("bowling", tmp_path)
     light.fit()
     assert light.compare().rows[0].rmse > 1.0  # metres
     found = light.diagnose().result
@@ -96,7 +96,7 @@ def test_the_law_of_drag_on_a_tennis_ball_is_left_open(tmp_path: Path) -> None:
     pytest.importorskip("torch")
     pytest.importorskip("mujoco")
     pytest.importorskip("meshio")
-    study = study_of("tennis", tmp_path, workers=1)
+    study = study_of("tennis", tmp_path)
     study.fit()
     found = study.diagnose().result
     assert found["verdict"] == "tied" and set(found["effects"]) == {"air-drag", "viscous-damping"}
