@@ -112,7 +112,7 @@ def test_what_the_hidden_effect_study_hides_is_named(tmp_path: Path) -> None:
     shutil.copy(EXAMPLES / "hidden_effect/study.toml", tmp_path)
     hidden = read_hidden(tmp_path / "recording.zarr")
     study = Study.load(tmp_path / "study.toml", workers=0)
-    study.config.estimator.draws, study.config.diagnose.draws = 32, 6
+    study.config.estimator.rounds, study.config.estimator.draws, study.config.diagnose.draws = 1, 32, 6
     study.config.diagnose.candidates = ["air-drag", "viscous-damping"]
     study.fit()
     result = study.diagnose().result

@@ -23,6 +23,8 @@ from ..roughness import Roughness, roughness, unrepeatable
 STEP_MATTERS = 1.0
 #: A rope that is turned in its grippers by more than this is told of [rad].
 TURN_MATTERS = 0.2
+#: Internal damping that calms most objects [s].
+CALM = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -46,11 +48,12 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
         out.append(f"close to the best fit {', '.join(failing)} cannot be simulated, so ± means little")
     piece = _piece(problem)
     if loose := unrepeatable(rough, problem.recordings, noise):
+        seen = " as [extractor] sees it" if problem.extractor.needs_images else ""
         out.append(
-            "the simulation is chaotic: next to nothing in the parameters moves "
+            f"the simulation{seen} is chaotic: next to nothing in the parameters moves "
             + "; ".join(loose)
             + "; what it does there is chance and does not count. Where chance does not decide in reality, "
-            "set [material] damping_time = 0.005 or lower [simulator] time_step"
+            + f"{_more_damping(problem, values)} or lower [simulator] time_step"
             + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
         )
     out += step_matters(pool, values, plain, rough, noise)
@@ -63,6 +66,16 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
                 f"give it: [noise] sd = ... in {'metres' if noise.unit == 'm' else 'pixels'}, or record repeats"
             )
     return out
+
+
+def _more_damping(problem: Problem, values: Mapping[str, float]) -> str:
+    """What to do for it, by what there is."""
+    if "damping_time" in values:
+        return "raise the lower bound [parameters.damping_time] low"
+    now = problem.material.damping_time
+    if now < CALM:
+        return f"set [material] damping_time = {CALM:g}"
+    return f"set [material] damping_time higher than the {now:g} that it is"
 
 
 def _piece(problem: Problem) -> float | None:
