@@ -163,7 +163,7 @@ def _carried(curve: FloatArray, poses: FloatArray) -> tuple[FloatArray, FloatArr
     tangents = _unit(np.concatenate([along[:, :1], along[:, 1:] + along[:, :-1], along[:, -1:]], axis=1))
     up = np.array([0.0, 0.0, 1.0])
     first, last = (rotate(poses[:, g, 3:], np.broadcast_to(up, (len(poses), 3))) for g in (0, 1))
-    # Angles are kept along the way, so it is that of any axis, vertex by vertex, that is carried on to the next one.
+    # Carrying keeps angles, so those add up by which any axis at a vertex, carried on, is off from the one at the next.
     any_axis = _across(np.eye(3)[np.abs(tangents).argmin(axis=2)], tangents)
     other = np.cross(tangents, any_axis)
     sums = tangents[:, :-1] + tangents[:, 1:]
