@@ -23,8 +23,8 @@ from ..roughness import Roughness, roughness, unrepeatable
 STEP_MATTERS = 1.0
 #: A rope that is turned in its grippers by more than this is told of [rad].
 TURN_MATTERS = 0.2
-#: Internal damping that calms most objects [s].
-CALM = 0.005
+#: Internal damping that is asked for where less lets a simulation be chaotic: that of cloth by default [s].
+CALMING_TIME = 0.005
 
 
 def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise: Noise) -> list[str]:
@@ -46,16 +46,8 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
     rough = roughness(pool, space, unit, problem.fit_on)
     if failing := [n for n in problem.fit_on if n not in rough.sd]:
         out.append(f"close to the best fit {', '.join(failing)} cannot be simulated, so ± means little")
-    piece = _piece(problem)
     if loose := unrepeatable(rough, problem.recordings, noise):
-        seen = " as [extractor] sees it" if problem.extractor.needs_images else ""
-        out.append(
-            f"the simulation{seen} is chaotic: next to nothing in the parameters moves "
-            + "; ".join(loose)
-            + "; what it does there is chance and does not count. Where chance does not decide in reality, "
-            + f"{_more_damping(problem, values)} or lower [simulator] time_step"
-            + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
-        )
+        out.append(_left_to_chance(problem, values, loose))
     out += step_matters(pool, values, plain, rough, noise)
     out += [*markers_beside(problem), *rope_turned(problem), *markers_elsewhere(problem, plain)]
     if noise.source.startswith("roughness"):
@@ -68,14 +60,26 @@ def doubts(pool: SimulationPool, space: ParameterSpace, unit: FloatArray, noise:
     return out
 
 
-def _more_damping(problem: Problem, values: Mapping[str, float]) -> str:
-    """What to do for it, by what there is."""
+def _left_to_chance(problem: Problem, values: Mapping[str, float], where: list[str]) -> str:
+    """The sentence of it, with what would help by what there is."""
+    moved = f"next to nothing in the parameters moves {'; '.join(where)}; what it does there"
+    if problem.extractor.needs_images:
+        return (
+            f"what [extractor] finds in drawn pictures jumps: {moved} is chance and does not count. More points, or an "
+            "extractor that finds the same ones again, would tell more"
+        )
+    now, piece = problem.material.damping_time, _piece(problem)
     if "damping_time" in values:
-        return "raise the lower bound [parameters.damping_time] low"
-    now = problem.material.damping_time
-    if now < CALM:
-        return f"set [material] damping_time = {CALM:g}"
-    return f"set [material] damping_time higher than the {now:g} that it is"
+        more = "raise the lower bound [parameters.damping_time] low"
+    elif now < CALMING_TIME:
+        more = f"set [material] damping_time = {CALMING_TIME:g}"
+    else:
+        more = f"set [material] damping_time higher than the {now:g} that it is"
+    return (
+        f"the simulation is chaotic: {moved} is chance and does not count. Where chance does not decide in reality, "
+        f"{more} or lower [simulator] time_step"
+        + (f"; fitted in pieces, it does not come so far: [study] window = {piece:.3g}" if piece else "")
+    )
 
 
 def _piece(problem: Problem) -> float | None:

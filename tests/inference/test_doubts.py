@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 from buckling import buckling_study
@@ -11,7 +12,7 @@ from muslin.core.parameters import Parameter, ParameterSpace
 from muslin.core.registry import REGISTRY
 from muslin.core.study import SimulationPool
 from muslin.inference.noise import Noise
-from muslin.inference.sequential.doubts import doubts
+from muslin.inference.sequential.doubts import _left_to_chance, doubts
 
 
 def test_a_time_step_that_moves_a_swung_rope_by_more_than_the_noise_is_told(tmp_path: Path) -> None:
@@ -40,12 +41,19 @@ def test_a_chaotic_simulation_is_told_with_what_would_calm_it(tmp_path: Path) ->
         space = ParameterSpace((*problem.space, *inferred))
         damped = replace(problem, material=material, space=space)
         with SimulationPool(damped, 0) as pool:
-            (told,) = (t for t in doubts(pool, space, np.full(len(space), 0.5), Noise(1e-9, 0.0, "test", "m", 0.01))
-                       if "chaotic" in t)  # fmt: skip
-        return told
+            told = doubts(pool, space, np.full(len(space), 0.5), Noise(1e-9, 0.0, "test", "m", 0.01))
+        (chaos,) = (text for text in told if "chaotic" in text)
+        return chaos
 
     assert own < 0.005 and "set [material] damping_time = 0.005 or lower" in said(own)
     assert "set [material] damping_time higher than the 0.02 that it is or lower" in said(0.02)
     assert "raise the lower bound [parameters.damping_time] low or lower" in said(
         own, Parameter("damping_time", "s", 1e-4, 1e-2, "log")
     )
+
+
+def test_what_is_found_in_pictures_is_not_calmed_by_damping(tmp_path: Path) -> None:
+    problem = buckling_study(tmp_path).problem
+    looking = replace(problem, extractor=SimpleNamespace(needs_images=True))  # type: ignore[arg-type]
+    told = _left_to_chance(looking, {}, ["up from 0.00 s on, by up to 4.5 px"])
+    assert "[extractor] finds in drawn pictures jumps" in told and "up to 4.5 px" in told and "damping" not in told

@@ -6,13 +6,13 @@ from effect_objects import G, engine
 
 from muslin.core.body import cloth_grid, rope_line
 from muslin.core.material import ClothMaterial, RopeMaterial
-from muslin.core.motion import Motion
+from muslin.core.motion import Motion, rotate
 from muslin.core.rollout import rollout
 from muslin.core.scenario import Scenario
 from muslin.core.scene import Scene
 from muslin.core.simulator import State
 from muslin.core.testing.reference import ReferenceSimulator
-from muslin.plugins.effects.grasp import CREEP_SPEED, GraspCompliance, GraspSlip
+from muslin.plugins.effects.grasp import CREEP_SPEED, GraspCompliance, GraspSlip, _moved
 from muslin.plugins.effects.grip_load import BendingPull, GripLoad
 
 SHEET = cloth_grid(0.2, 0.2, 6, 6)
@@ -155,3 +155,14 @@ def test_a_soft_grasp_brings_a_little_damping():
     for value, most in ((1e-9, 1e-7), (0.05, 0.002)):
         added = GraspCompliance(compliance=value).on_material(LINE).damping_time
         assert 0 < added < most
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-4, 0.7, 3.0])
+def test_a_grasp_is_displaced_as_a_rigid_body(angle: float) -> None:
+    rng = np.random.default_rng(0)
+    points, shift, axis = rng.normal(size=(5, 3)), rng.normal(size=3), rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    centre = points.mean(axis=0)
+    turn = np.array([np.cos(angle / 2), *(np.sin(angle / 2) * axis)])
+    expected = centre + rotate(turn, points - centre) + shift
+    np.testing.assert_allclose(_moved(points, np.concatenate([shift, angle * axis])), expected, atol=1e-12)
