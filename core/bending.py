@@ -7,6 +7,7 @@ import numpy as np
 from .arrays import FloatArray, IntArray, cross, dot
 from .body import Body
 from .clamps import clamped_segments
+from .material import RopeMaterial
 
 #: Share of a hinge's bending that goes to either end of its edge and to either opposite vertex.
 _SHARES = np.array([1 / 3, 1 / 3, 1 / 6, 1 / 6])
@@ -65,6 +66,17 @@ class Bending(ABC):
 def bending_of(body: Body, held: IntArray = _NONE) -> Bending:
     """The bending of a cloth or a rope of which vertices are held, followed to its rest shape."""
     return RopeBending(body, held) if body.kind == "rope" else SheetBending(body)
+
+
+def rope_rigidities(body: Body, material: RopeMaterial) -> FloatArray:
+    """Bending rigidity E I ``(V - 2,)`` [N m2] at the inner vertices of a rope."""
+    return material.bending_rigidity * material.bending_shares(inner_places(body))
+
+
+def inner_places(body: Body) -> FloatArray:
+    """Where the inner vertices of a rope are, as shares of its length ``(V - 2,)``."""
+    so_far = np.cumsum(body.measures)
+    return np.asarray(so_far[:-1] / so_far[-1])
 
 
 class SheetBending(Bending):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .arrays import FloatArray
-from .bending import RopeBending
+from .bending import RopeBending, inner_places
 from .material import RopeMaterial
 from .scene import Scene
 
@@ -24,26 +24,34 @@ _FREEDOM = 3.0
 class KeptBend:
     r"""Natural curvature of a rope of any stiffness, mass and damping under any gravity.
 
-    It is linear in what it is made of, so it is told once for all draws of a study.
+    It is linear in what it is made of, so it is told once for all draws of a study. Where a rope is b times as stiff
+    as in the mean, it is :math:`b \kappa` that moments over EI are in balance with. So what is told by how it is bent
+    is told by place, K of them, which count by their b; and of all that the bend is one b-th of where it is.
 
     Args:
-        shape: what a rope keeps if it carries nothing ``(N, 2)`` [1/m].
-        rates: what the damping of a bend that changes adds to that, per damping time ``(N, 2)`` [1/(m s)].
+        shapes: what a rope keeps if it carries nothing ``(K, N, 2)`` [1/m].
+        rates: what the damping of a bend that changes adds to that, per damping time ``(K, N, 2)`` [1/(m s)].
         moments: that what it carries bends it by ``(2, 4, N, 2)``: the rope's own mass, at 1 kg/m,
             and the loads; first for their acceleration [N m], then for a gravity of -1 m/s2 along x, y and z each.
         torsion: that its twist bends it by, at a twist rigidity of 1 N m2 ``(N, 2)`` [N m].
+        told_at: where the K places are, as shares of the length ``(K,)``.
+        along: where the N curvatures are ``(N,)``.
     """
 
-    shape: FloatArray
+    shapes: FloatArray
     rates: FloatArray
     moments: FloatArray
     torsion: FloatArray
+    told_at: FloatArray
+    along: FloatArray
 
     def curvature(self, material: RopeMaterial, gravity: FloatArray) -> FloatArray:
         """The natural curvature ``(N, 2)`` [1/m]; ``gravity (3,)`` [m/s2]."""
         carried = np.tensordot([material.linear_density, 1.0], self.moments, 1)
         moments = carried[0] - np.tensordot(gravity, carried[1:], 1) + material.twist_rigidity * self.torsion
-        return np.asarray(self.shape + material.damping_time * self.rates - moments / material.bending_rigidity)
+        bent = np.tensordot(material.bending_shares(self.told_at), self.shapes + material.damping_time * self.rates, 1)
+        stiff = material.bending_shares(self.along)
+        return np.asarray((bent - moments / material.bending_rigidity) / stiff[:, None])
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +73,8 @@ class StateBend:
         """The same in other cross-section axes: from ``axes (N, 2, 3)`` into ``into (N, 2, 3)``."""
         turn = np.einsum("nax,nbx->nab", axes, into)
         old = self.least
-        least = KeptBend(*(np.einsum("...na,nab->...nb", x, turn) for x in _parts(old)))
+        shapes, rates, moments, torsion = (np.einsum("...na,nab->...nb", x, turn) for x in _parts(old))
+        least = KeptBend(shapes, rates, moments, torsion, old.told_at, old.along)
         return StateBend(least, np.einsum("naw,nab->nbw", self.ways, turn), self.measures)
 
 
@@ -78,7 +87,8 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
 
     States do not tell it equally well: where a rope whips, or markers went wrong, they are far from the others. So a
     state that is r off counts by :math:`1 / (r^2 + 3\, \text{median } r^2)`, much as under Student's distribution of
-    three degrees of freedom, by the damping time, mass and twisting over bending stiffness that leave least.
+    three degrees of freedom, by the damping time, mass and twisting over bending stiffness that leave least in a rope
+    that is as stiff everywhere.
 
     Args:
         states: that the rope was seen in.
@@ -89,17 +99,28 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
     told = np.stack([weight * _columns(s.least) for s in states])
     ways = (weight * s.ways.reshape(len(weight), -1) for s in states)
     seen = np.stack([np.eye(len(weight)) - w @ w.T for w in ways])
+    even = _even(told)
     counts: FloatArray = np.ones(len(states))
-    common: FloatArray = np.zeros(told.shape[1:])
     for _ in range(_ROUNDS):
         share = counts / counts.sum()
-        least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(len(weight))
-        common = np.asarray(np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1)), np.float64)
-        squares = _squares(seen @ (told - common), share, gravity)
+        squares = _squares(seen @ (even - _together(seen, even, share)), share, gravity)
         before, counts = counts, 1.0 / np.maximum(squares + _FREEDOM * np.median(squares), _NOTHING)
         if np.allclose(counts, before, rtol=_NEAR):
             break
-    return _from_columns(common / weight)
+    return _from_columns(_together(seen, told, share) / weight, states[0].least.along)
+
+
+def _together(seen: FloatArray, told: FloatArray, share: FloatArray) -> FloatArray:
+    """What states that count by their ``share (S,)`` tell ``(2 N, C)``, of what each tells ``(S, 2 N, C)``."""
+    least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(seen.shape[1])
+    return np.asarray(np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1)), np.float64)
+
+
+def _even(columns: FloatArray) -> FloatArray:
+    """All that the bend of a rope is made of that is as stiff everywhere ``(S, 2 N, 11)``."""
+    count = columns.shape[1] // 2
+    by_place = (columns[..., :count], columns[..., count : 2 * count])
+    return np.concatenate([*(x.sum(axis=2, keepdims=True) for x in by_place), columns[..., 2 * count :]], axis=2)
 
 
 def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatArray:
@@ -123,17 +144,19 @@ def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatAr
 
 
 def _parts(bend: KeptBend) -> tuple[FloatArray, ...]:
-    return bend.shape, bend.rates, bend.moments, bend.torsion
+    return bend.shapes, bend.rates, bend.moments, bend.torsion
 
 
 def _columns(bend: KeptBend) -> FloatArray:
-    """All that it is made of ``(2 N, 11)``."""
-    return np.concatenate([x.reshape(-1, bend.shape.size) for x in _parts(bend)]).T
+    """All that it is made of ``(2 N, 2 N + 9)``."""
+    return np.concatenate([x.reshape(-1, bend.torsion.size) for x in _parts(bend)]).T
 
 
-def _from_columns(columns: FloatArray) -> KeptBend:
-    shape, rates, *moments, torsion = columns.T.reshape(11, -1, 2)
-    return KeptBend(shape, rates, np.reshape(moments, (2, 4, *shape.shape)), torsion)
+def _from_columns(columns: FloatArray, along: FloatArray) -> KeptBend:
+    count = len(along)
+    parts = columns.T.reshape(-1, count, 2)
+    shapes, rates, moments, torsion = np.split(parts, [count, 2 * count, 2 * count + 8])
+    return KeptBend(shapes, rates, moments.reshape(2, 4, count, 2), torsion[0], along, along)
 
 
 def kept_in(scene: Scene, bending: RopeBending, twist: FloatArray | None = None) -> StateBend:
@@ -180,9 +203,16 @@ def kept_in(scene: Scene, bending: RopeBending, twist: FloatArray | None = None)
     weight = np.sqrt(np.repeat(bending.measures, 2))[:, None]
     ways, extents, _ = np.linalg.svd(weight * open_, full_matrices=False)
     ways = ways[:, extents > _RANK * weight.max()]  # what is left open may be tension alone, as of a held segment
-    told = np.stack([bending.curvature.ravel(), bending.rates(moving).ravel(), *balanced[: 2 * places].T], axis=1)
+    by_place = (_by_place(bending.curvature), _by_place(bending.rates(moving)))
+    told = np.concatenate([*by_place, balanced[: 2 * places]], axis=1)
     least = told - (ways @ (ways.T @ (weight * told))) / weight
-    return StateBend(_from_columns(least), (ways / weight).reshape(places, 2, -1), bending.measures)
+    kept = _from_columns(least, inner_places(scene.body))
+    return StateBend(kept, (ways / weight).reshape(places, 2, -1), bending.measures)
+
+
+def _by_place(curvature: FloatArray) -> FloatArray:
+    """``(N, 2)`` as columns of one place each ``(2 N, N)``."""
+    return np.asarray((curvature[:, :, None] * np.eye(len(curvature))[:, None]).reshape(-1, len(curvature)))
 
 
 def torsion_forces(vertices: FloatArray, torques: FloatArray) -> FloatArray:

@@ -3,6 +3,9 @@
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, TypeAlias, TypeVar, cast
 
+import numpy as np
+
+from .arrays import FloatArray
 from .errors import InputError
 from .parameters import Parameter
 
@@ -28,6 +31,8 @@ _POSITIVE = (
     "youngs_modulus",
     "weft_stretch_ratio",
     "weft_bending_ratio",
+    "end_bending_ratio",
+    "far_bending_ratio",
 )
 
 
@@ -72,7 +77,10 @@ class ClothMaterial:
 
 @dataclass(frozen=True)
 class RopeMaterial:
-    """A rope, cable or rod.
+    r"""A rope, cable or rod, as stiff everywhere or not.
+
+    At the share s of its length it has E I times :math:`\sqrt{r}^{\cos 2 \pi s} \sqrt{q}^{- \cos \pi s}`, with r and q
+    the last two ratios, so that E I is the geometric mean along it.
 
     Args:
         linear_density: mass per length [kg/m].
@@ -82,6 +90,8 @@ class RopeMaterial:
         diameter: of its round cross-section, for contact and drag [m].
         damping_time: stiffness-proportional damping, the beta of C = beta K [s].
         friction: Coulomb coefficient against an obstacle of friction 1 [1].
+        end_bending_ratio: E I at the ends over that in the middle [1].
+        far_bending_ratio: E I at the last end over that at the first [1].
     """
 
     linear_density: float = 0.05
@@ -91,6 +101,8 @@ class RopeMaterial:
     diameter: float = 0.008
     damping_time: float = 0.0
     friction: float = 0.3
+    end_bending_ratio: float = 1.0
+    far_bending_ratio: float = 1.0
 
     kind: ClassVar[str] = "rope"
 
@@ -101,6 +113,16 @@ class RopeMaterial:
     def density(self) -> float:
         """Mass per measure of an element (length) [kg/m]."""
         return self.linear_density
+
+    @property
+    def is_even(self) -> bool:
+        """Whether it is as stiff in bending everywhere."""
+        return self.end_bending_ratio == 1.0 == self.far_bending_ratio
+
+    def bending_shares(self, along: FloatArray) -> FloatArray:
+        """E I over its mean ``(N,)`` [1] at the shares ``along (N,)`` of the length."""
+        ends, far = 0.5 * np.log(self.end_bending_ratio), 0.5 * np.log(self.far_bending_ratio)
+        return np.asarray(np.exp(ends * np.cos(2.0 * np.pi * along) - far * np.cos(np.pi * along)))
 
 
 @dataclass(frozen=True)
@@ -169,6 +191,8 @@ UNITS: dict[str, dict[str, str]] = {
         "bending_rigidity": "N m2",
         "twist_rigidity": "N m2",
         "diameter": "m",
+        "end_bending_ratio": "1",
+        "far_bending_ratio": "1",
         **_SHARED_UNITS,
     },
     "solid": {"density": "kg/m3", "youngs_modulus": "Pa", "poisson_ratio": "1", **_SHARED_UNITS},

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import FloatArray, IntArray
+from .bending import inner_places
 from .body import Body
 from .clamps import clamped_segments
 from .interpolation import interpolate
@@ -46,17 +47,18 @@ def refined(scenario: Scenario) -> Scenario | None:
 
 def _halved(bend: KeptBend, body: Body, held: IntArray) -> KeptBend:
     """The bend at the inner vertices of a rope whose segments were halved; within a clamp there is none."""
-    old = np.arange(1.0, bend.shape.shape[0] + 1)
+    old = np.arange(1.0, len(bend.along) + 1)
     new = 0.5 * np.arange(1.0, len(body.vertices) - 1, dtype=np.float64)
     clamped = clamped_segments(body, held)
     free = np.where(clamped[1:] & clamped[:-1], 0.0, 1.0)[:, None]
-    moments = interpolate(new, old, np.moveaxis(bend.moments, 2, 0))
-    return KeptBend(
-        free * interpolate(new, old, bend.shape),
-        free * interpolate(new, old, bend.rates),
-        free * np.moveaxis(moments, 0, 2),
-        free * interpolate(new, old, bend.torsion),
-    )
+
+    def finer(values: FloatArray) -> FloatArray:
+        """``(..., N, 2)`` at the new vertices."""
+        return free * np.moveaxis(interpolate(new, old, np.moveaxis(values, -2, 0)), 0, -2)
+
+    parts = (bend.shapes, bend.rates, bend.moments, bend.torsion)
+    shapes, rates, moments, torsion = (finer(values) for values in parts)
+    return KeptBend(shapes, rates, moments, torsion, bend.told_at, inner_places(body))
 
 
 def _quartered(body: Body, middles: IntArray) -> IntArray:

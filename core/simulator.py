@@ -10,7 +10,7 @@ import numpy as np
 from .arrays import FloatArray
 from .body import Body
 from .errors import InputError
-from .material import ClothMaterial
+from .material import ClothMaterial, RopeMaterial
 from .obstacles import Cylinder, StaticMesh, Table
 from .scene import Scene
 
@@ -23,6 +23,7 @@ CAPABILITIES: dict[str, str] = {
     "curved-rest": "make an object whose rest shape is not flat or straight",
     "start-shape": "start from a shape that is not the rest shape",
     "start-velocity": "start in motion",
+    "uneven-rope": "make a rope that is stiffer in some places than in others",
     "twist": "make a rope that resists torsion, and starts twisted",
     "varying-stiffness": "change the stretch stiffness of elements during a rollout",
     "contact-forces": "tell the forces of the obstacles on the vertices",
@@ -159,6 +160,8 @@ def needed_capabilities(scene: Scene) -> frozenset[str]:
     material = scene.material
     if isinstance(material, ClothMaterial) and (material.weft_stretch_ratio, material.weft_bending_ratio) != (1, 1):
         needed.add("anisotropy")
+    if isinstance(material, RopeMaterial) and not material.is_even:
+        needed.add("uneven-rope")
     if scene.body.kind != "solid" and not _is_straight(scene.body):
         needed.add("curved-rest")
     return frozenset(needed)

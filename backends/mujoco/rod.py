@@ -8,7 +8,7 @@ segment is elastic. So it has the implicit treatment, the geometric stiffness an
 import numpy as np
 
 from ...core.arrays import FloatArray, IntArray, cross, dot
-from ...core.bending import RopeBending
+from ...core.bending import RopeBending, rope_rigidities
 from ...core.body import Body
 from ...core.clamps import clamped_segments
 from ...core.material import RopeMaterial
@@ -54,8 +54,8 @@ def hinge_stiffnesses(body: Body, material: RopeMaterial, held: IntArray) -> tup
     lengths = np.where(clamped_segments(body, held), 0.0, body.measures)
     flexible = lengths[:-1] + lengths[1:]
     flexible = np.where(flexible > 0, flexible, body.measures[:-1] + body.measures[1:])
-    bend, twist = max(material.bending_rigidity, _SMALLEST), max(material.twist_rigidity, _SMALLEST)
-    return bend / flexible, twist / flexible
+    bend = np.maximum(rope_rigidities(body, material), _SMALLEST)
+    return bend / flexible, max(material.twist_rigidity, _SMALLEST) / flexible
 
 
 def stretch_damping(body: Body, material: RopeMaterial, masses: FloatArray, held: IntArray) -> float:
@@ -96,9 +96,10 @@ def looking_back(body: Body, material: RopeMaterial, held: IntArray, time_step: 
     turn = float(np.linalg.norm(np.ptp(path, axis=0)))
     if turn < _STRAIGHT:
         return _FURTHEST_BACK
-    twist = material.twist_rigidity + _LIMP * material.bending_rigidity
+    bend = float(rope_rigidities(body, material).min())
+    twist = material.twist_rigidity + _LIMP * bend
     coupling = twist * (turn / np.pi) ** 2 * (1.0 + _BY_DAMPING * material.damping_time / time_step)
-    most = (np.sqrt(1.0 + material.bending_rigidity / max(coupling, _SMALLEST)) - 1.0) / 2.0
+    most = (np.sqrt(1.0 + bend / max(coupling, _SMALLEST)) - 1.0) / 2.0
     return float(min(_FURTHEST_BACK, _OF_THE_WAY_BACK * most))
 
 

@@ -35,6 +35,7 @@ class MujocoSimulator(Simulator):
             "curved-rest",
             "start-shape",
             "start-velocity",
+            "uneven-rope",
             "twist",
             "varying-stiffness",
             "contact-forces",

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
+from ...core.bending import rope_rigidities
 from ...core.body import Body
 from ...core.clamps import clamped_segments
 from ...core.material import RopeMaterial
@@ -70,7 +71,7 @@ class Rod(Elasticity):
         unit = np.diff(body.vertices, axis=0) / rest[:, None]
         clamped = clamped_segments(body, held)
         mean = 0.5 * (rest[:-1] + rest[1:])
-        bending = material.bending_rigidity / mean * np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
+        bending = rope_rigidities(body, material) / mean * np.where(clamped[:-1] ^ clamped[1:], 2.0, 1.0)
         turn = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(unit, axis=0), axis=1), 0.0, 1.0))
         turn[turn < 1e-6] = 0.0
         rounding = (_ROUNDING * turn) ** 2 + 1e-12

@@ -34,6 +34,7 @@ class PybulletSimulator(Simulator):
             "curved-rest",
             "start-shape",
             "start-velocity",
+            "uneven-rope",
             "varying-stiffness",
             "contact-forces",
         }

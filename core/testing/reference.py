@@ -22,7 +22,7 @@ class ReferenceSimulator(Simulator):
 
     name: ClassVar[str] = "reference"
     object_kinds: ClassVar[frozenset[str]] = frozenset({"cloth", "rope", "solid"})
-    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - {"twist"}
+    capabilities: ClassVar[frozenset[str]] = frozenset(CAPABILITIES) - {"twist", "uneven-rope"}
 
     def __init__(self, time_step: float = 0.005) -> None:
         self.time_step = time_step

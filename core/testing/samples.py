@@ -100,5 +100,8 @@ def sample_scenario(kind: str, duration: float = 0.3, obstacles: tuple[Obstacle,
 
 def _sample_bend(count: int) -> KeptBend:
     """Of a rope that is bent to a radius of 0.5 m where nothing acts on it, whatever it is made of."""
-    shape = np.tile([0.0, 2.0], (count - 2, 1))
-    return KeptBend(shape, 0.0 * shape, np.zeros((2, 4, *shape.shape)), 0.0 * shape)
+    inner = count - 2
+    shapes = np.eye(inner)[:, :, None] * np.array([0.0, 2.0])
+    nothing = np.zeros((inner, 2))
+    along = np.arange(1, count - 1) / (count - 1)
+    return KeptBend(shapes, 0.0 * shapes, np.zeros((2, 4, *nothing.shape)), nothing, along, along)

@@ -5,7 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.bending import bending_of
+from ...core.bending import bending_of, rope_rigidities
 from ...core.effect import Effect, NodalForce
 from ...core.material import ClothMaterial, RopeMaterial
 from ...core.parameters import Parameter
@@ -38,7 +38,7 @@ class Crease(Effect):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         bending = bending_of(scene.body, scene.held)
         bending.follow(scene.start_positions)
-        rigidity = bending_rigidity(scene.material)
+        rigidity = bending_rigidity(scene)
         most = 1.0 / self.values["yield_radius"]
         plastic = np.zeros_like(bending.curvature)
 
@@ -57,10 +57,11 @@ def beyond(curvature: FloatArray, most: float) -> FloatArray:
     return np.asarray(curvature * (1.0 - most / np.maximum(size, max(most, 1e-300)))[:, None])
 
 
-def bending_rigidity(material: object) -> FloatArray:
-    """Bending rigidity of each number of curvature: of a cloth ``(3,)`` [N m] with x the warp, of a rope ``(2,)``."""
+def bending_rigidity(scene: Scene) -> FloatArray:
+    """That of each number of curvature: of a cloth ``(3,)`` [N m] with x the warp, of a rope ``(V - 2, 1)`` [N m2]."""
+    material = scene.material
     if isinstance(material, RopeMaterial):
-        return np.full(2, material.bending_rigidity)
+        return rope_rigidities(scene.body, material)[:, None]
     assert isinstance(material, ClothMaterial)
     root = np.sqrt(material.weft_bending_ratio)
     return material.bending_rigidity * np.array([1.0 / root, root, 1.0])

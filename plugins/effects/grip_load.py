@@ -40,7 +40,7 @@ class GripLoad:
         material, body = scene.material, scene.body
         self._rope = isinstance(material, RopeMaterial)
         if isinstance(material, RopeMaterial):
-            self._bends = _stiffest_motions(scene, held, bending_rigidity(material))
+            self._bends = _stiffest_motions(scene, held, bending_rigidity(scene))
             self._moduli = np.array([[material.stretch_stiffness]])
         else:
             assert isinstance(material, ClothMaterial)
@@ -110,7 +110,7 @@ class BendingPull:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._bending, self._rigidity = bending_of(scene.body, scene.held), bending_rigidity(scene.material)
+        self._bending, self._rigidity = bending_of(scene.body, scene.held), bending_rigidity(scene)
         self._bending.follow(scene.start_positions)
 
     def __call__(self, positions: FloatArray) -> FloatArray:

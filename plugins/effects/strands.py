@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...core.bending import RopeBending
+from ...core.bending import RopeBending, rope_rigidities
 from ...core.effect import Effect, NodalForce
 from ...core.material import Material, RopeMaterial
 from ...core.parameters import Parameter
@@ -57,7 +57,7 @@ class RopeHysteresis(Effect):
     def bind(self, scene: Scene, masses: FloatArray) -> NodalForce:
         assert isinstance(scene.material, RopeMaterial)
         bending = RopeBending(scene.body, scene.held)
-        lost = self.values["sliding_share"] * scene.material.bending_rigidity
+        lost = self.values["sliding_share"] * rope_rigidities(scene.body, scene.material)[:, None]
         most = self.values["slip_curvature"]
         earlier = [] if scene.earlier is None else list(scene.earlier)
         first, *later = [*earlier, scene.start_positions]

@@ -173,7 +173,9 @@ def cloud(motion: str, sheet: str) -> Case:
 
 BEAMS = [beam("gravity-b"), beam("load52-a", ", from 52 g", HELD_LOWER)]
 CABLES = [cable(number) for number in (1, 2, 3)]
-SLIDING = [given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES]
+SLIDES = ("rest-curvature", "rope-hysteresis")
+SLIDING = [given(case, "bent, sliding", *SLIDES) for case in CABLES]
+UNEVEN = [given(case, "bent, sliding, uneven", *SLIDES, "uneven-rigidity") for case in CABLES]
 CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth)
 IN_AIR = Case("carried cloth, air", DATA / "cloth_carried", carried_in_air, picture=True)
 CASES = [
@@ -182,7 +184,8 @@ CASES = [
     *(replace(on_pybullet(case), picture=case is BEAMS[1]) for case in BEAMS),
     *CABLES,
     *SLIDING,
-    *(on_pybullet(case, "twist_rigidity") for case in SLIDING),
+    *UNEVEN,
+    *(on_pybullet(case, "twist_rigidity") for case in (*SLIDING, *UNEVEN)),
     *(CARRIED, on_pybullet(CARRIED), IN_AIR, on_pybullet(IN_AIR)),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from muslin.core.kept_bend import KeptBend
+from muslin.core.material import RopeMaterial
 from muslin.core.refinement import refined
 from muslin.core.scenario import marker_weights
 from muslin.core.scenarios import preset
@@ -62,15 +63,20 @@ def test_a_bend_that_a_rope_keeps_is_the_same_on_the_finer_mesh() -> None:
     places = np.arange(1, 20)
     shape = np.stack([2.0 + np.sin(places / 5.0), 0.1 * places], axis=1)
     moments = np.random.default_rng(0).normal(size=(2, 4, 1, 2)) * np.linspace(0.0, 1.0, 19)[:, None]
-    coarse = replace(coarse, kept=KeptBend(shape, 0.1 * shape, moments, 0.2 * shape))
+    shapes = np.eye(19)[:, :, None] * shape
+    coarse = replace(coarse, kept=KeptBend(shapes, 0.1 * shapes, moments, 0.2 * shape, places / 20, places / 20))
     fine = refined(coarse)
     assert fine is not None and fine.kept is not None
-    assert [x.shape for x in (fine.kept.shape, fine.kept.moments)] == [(39, 2), (2, 4, 39, 2)]
-    np.testing.assert_allclose(fine.kept.shape[3:-3:2], shape[1:-1])
-    np.testing.assert_allclose(fine.kept.rates[3:-3:2], 0.1 * shape[1:-1])
+    assert [x.shape for x in (fine.kept.shapes, fine.kept.moments)] == [(19, 39, 2), (2, 4, 39, 2)]
+    np.testing.assert_allclose(fine.kept.shapes.sum(axis=0)[3:-3:2], shape[1:-1])
+    np.testing.assert_allclose(fine.kept.rates.sum(axis=0)[3:-3:2], 0.1 * shape[1:-1])
     np.testing.assert_allclose(fine.kept.torsion[3:-3:2], 0.2 * shape[1:-1])
     np.testing.assert_allclose(fine.kept.moments[..., 3:-3:2, :], moments[..., 1:-1, :])
-    bends = [bent(s, s.kept.shape) for s in (coarse, fine) if s.kept is not None]
+    np.testing.assert_allclose(fine.kept.along, np.arange(1, 40) / 40)
+    rope, gravity = RopeMaterial(end_bending_ratio=0.3, far_bending_ratio=2.0), np.zeros(3)
+    uneven = [s.kept.curvature(rope, gravity) for s in (coarse, fine) if s.kept is not None]
+    np.testing.assert_allclose(uneven[1][3:-3:2], uneven[0][1:-1])
+    bends = [bent(s, s.kept.shapes.sum(axis=0)) for s in (coarse, fine) if s.kept is not None]
     np.testing.assert_allclose(bends[1].vertices[::2], bends[0].vertices, atol=5e-3)
     straight = np.diff(bends[1].vertices[:3], axis=0)
     np.testing.assert_allclose(np.cross(*straight), 0.0, atol=1e-12)

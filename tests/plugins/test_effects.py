@@ -56,6 +56,7 @@ DECLARED: dict[str, tuple[str, str, str, dict[str, str]]] = {
     "strain-stiffening": ("material", "bind_stiffness", "cloth rope", {"stiffening": "1"}),
     "table-tilt": ("contact", "on_obstacles", ALL, {"about_x": "rad", "about_y": "rad"}),
     "twist-stiffness": ("material", "on_material", "rope", {"twist_rigidity": "N m2"}),
+    "uneven-rigidity": ("material", "on_material", "rope", {"log_end_ratio": "1", "log_far_ratio": "1"}),
     "viscous-damping": ("force", "bind", ALL, {"rate": "1/s"}),
     "wet-patch": ("mass", "on_loads", "cloth rope", {"uptake": "1", "extent": "1"}),
     "wind": ("force", "bind", ALL, {"velocity_x": "m/s", "velocity_y": "m/s"}),
@@ -91,6 +92,7 @@ LAWS = (
     "stick-slip",
     "strain-stiffening",
     "twist-stiffness",
+    "uneven-rigidity",
     "viscous-damping",
     "wind",
 )
