@@ -25,7 +25,7 @@ class RestCurvature(Effect):
     What hardly any state tells is a bend that is even along a rope between two clamps, as that of a spool on which it
     was stored: the clamps give how much the rope turns in all, so as long as it stays in one plane such a bend changes
     neither its shape nor its energy. How it moves out of that plane does tell. So that part has coefficients of its
-    own, which come on top.
+    own, which come on top; where a rope is not as stiff everywhere, it is the moment of that bend that is even.
 
     References:
         Twigg and Kacic-Alesic, *Optimization for sag-free simulations*, 2011; Derouet-Jourdan et al., *Stable
@@ -48,4 +48,5 @@ class RestCurvature(Effect):
         if scenario.kept is None or not isinstance(material, RopeMaterial):
             return scenario.body
         even = np.array([self.values["even_about_z"], self.values["even_about_side"]])
+        even = even / material.bending_shares(scenario.kept.along)[:, None]
         return bent(scenario, self.values["share"] * scenario.kept.curvature(material, gravity) + even)

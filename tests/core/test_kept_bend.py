@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from muslin.core.arrays import FloatArray
-from muslin.core.bending import RopeBending
+from muslin.core.bending import RopeBending, rope_rigidities
 from muslin.core.beside import untwisted_frames
 from muslin.core.body import rope_line
 from muslin.core.kept_bend import StateBend, common_bend, kept_in
@@ -23,6 +23,7 @@ from muslin.core.scene import Scene
 from muslin.core.series import PointSeries
 
 MATERIAL = RopeMaterial(linear_density=0.05, stretch_stiffness=2000.0, bending_rigidity=2e-3, twist_rigidity=2e-3)
+ROPE = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 26)
 
 
 def test_an_arc_without_weight_is_all_natural_curvature_or_none() -> None:
@@ -126,10 +127,9 @@ def test_a_bent_body_has_the_curvature_that_it_was_given(size: float) -> None:
     np.testing.assert_allclose(got, wanted, atol=0.02 * size)
 
 
-def states_of(kept: FloatArray, count: int, errors: float = 0.0) -> list[StateBend]:
+def states_of(kept: FloatArray, count: int, errors: float = 0.0, material: RopeMaterial = MATERIAL) -> list[StateBend]:
     """What random states of a rope that two clamps hold, in balance with its own bend ``kept``, tell of it."""
     rng = np.random.default_rng(2)
-    body = rope_line(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), 26)
     grasps = (np.array([0, 1]), np.array([24, 25]))
     gravity = np.array([0.0, 0.0, -9.81])
     out = []
@@ -140,14 +140,15 @@ def states_of(kept: FloatArray, count: int, errors: float = 0.0) -> list[StateBe
         directions = np.concatenate([np.ones((25, 1)), waves], axis=1)
         directions *= 0.04 / np.linalg.norm(directions, axis=1, keepdims=True)
         points = np.concatenate([np.zeros((1, 3)), np.cumsum(rotate(pose[3:], directions), axis=0)])
-        bending = RopeBending(body, np.concatenate(grasps))
+        bending = RopeBending(ROPE, np.concatenate(grasps))
         bending.follow(points)
         frames = untwisted_frames(points[None], np.tile(pose, (1, 2, 1)))[0, 1:-1]
         own = np.einsum("na,nax,nbx->nb", kept, frames, bending.axes)
         own += errors * rng.normal(size=own.shape)
-        forces = bending.forces(2e-3 * (bending.curvature - own))
-        accelerations = forces / (0.05 * body.vertex_measures)[:, None] + gravity
-        scene = Scene(body, MATERIAL, gravity, grasps, np.zeros(26), (), points, start_accelerations=accelerations)
+        rigidity = rope_rigidities(ROPE, material)[:, None]
+        forces = bending.forces(rigidity * (bending.curvature - own))
+        accelerations = forces / (0.05 * ROPE.vertex_measures)[:, None] + gravity
+        scene = Scene(ROPE, MATERIAL, gravity, grasps, np.zeros(26), (), points, start_accelerations=accelerations)
         out.append(kept_in(scene, bending).turned(bending.axes, frames))
     return out
 
@@ -166,6 +167,21 @@ def test_states_tell_together_what_each_leaves_open() -> None:
     np.testing.assert_allclose(common_bend(states[:1] * 20, gravity).curvature(MATERIAL, gravity), each[0], atol=1e-9)
     assert rms(each.mean(axis=0) - kept) > 0.2 * rms(kept)
     assert rms(common_bend(states, gravity).curvature(MATERIAL, gravity) - kept) < 0.05 * rms(kept)
+
+
+def test_it_is_told_of_a_rope_that_is_not_as_stiff_everywhere() -> None:
+    gravity = np.array([0.0, 0.0, -9.81])
+    kept = np.outer(3.0 * np.cos(2 * np.pi * np.linspace(0.0, 1.0, 24)), [1.0, 1.0])
+    uneven = replace(MATERIAL, end_bending_ratio=0.3, far_bending_ratio=1.5)
+    told = common_bend(states_of(kept, 40, material=uneven), gravity)
+
+    def off(rope: RopeMaterial) -> float:
+        """But for an even moment, which the clamps take up."""
+        moment = rope_rigidities(ROPE, rope)[:, None] * (told.curvature(rope, gravity) - kept)
+        return rms(moment - moment.mean(axis=0)) / (2e-3 * rms(kept))
+
+    assert off(uneven) < 0.05
+    assert off(MATERIAL) > 0.2
 
 
 def test_what_hardly_any_state_tells_is_not_filled_with_their_errors() -> None:
