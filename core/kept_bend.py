@@ -96,31 +96,34 @@ def common_bend(states: Sequence[StateBend], gravity: FloatArray) -> KeptBend:
     """
     measures = states[0].measures
     weight = np.sqrt(np.repeat(measures, 2))[:, None]
-    told = np.stack([weight * _columns(s.least) for s in states])
     ways = (weight * s.ways.reshape(len(weight), -1) for s in states)
     seen = np.stack([np.eye(len(weight)) - w @ w.T for w in ways])
-    even = _even(told)
+    even = np.stack([_even(weight * _columns(s.least)) for s in states])
     counts: FloatArray = np.ones(len(states))
     for _ in range(_ROUNDS):
         share = counts / counts.sum()
-        squares = _squares(seen @ (even - _together(seen, even, share)), share, gravity)
+        common = _together(seen, np.tensordot(share, even, 1), share)
+        squares = _squares(seen @ (even - common), share, gravity)
         before, counts = counts, 1.0 / np.maximum(squares + _FREEDOM * np.median(squares), _NOTHING)
         if np.allclose(counts, before, rtol=_NEAR):
             break
+    told = np.zeros_like(_columns(states[0].least))
+    for part, state in zip(share, states, strict=True):  # not all at once: they are many numbers
+        told += part * weight * _columns(state.least)
     return _from_columns(_together(seen, told, share) / weight, states[0].least.along)
 
 
 def _together(seen: FloatArray, told: FloatArray, share: FloatArray) -> FloatArray:
-    """What states that count by their ``share (S,)`` tell ``(2 N, C)``, of what each tells ``(S, 2 N, C)``."""
+    """What states that count by their ``share (S,)`` tell ``(2 N, C)``, of the mean of what each tells."""
     least = np.tensordot(share, seen, 1) + _HARDLY * np.eye(seen.shape[1])
-    return np.asarray(np.linalg.solve(least, (1.0 + _HARDLY) * np.tensordot(share, told, 1)), np.float64)
+    return np.asarray(np.linalg.solve(least, (1.0 + _HARDLY) * told), np.float64)
 
 
 def _even(columns: FloatArray) -> FloatArray:
-    """All that the bend of a rope is made of that is as stiff everywhere ``(S, 2 N, 11)``."""
-    count = columns.shape[1] // 2
-    by_place = (columns[..., :count], columns[..., count : 2 * count])
-    return np.concatenate([*(x.sum(axis=2, keepdims=True) for x in by_place), columns[..., 2 * count :]], axis=2)
+    """All that the bend of a rope is made of that is as stiff everywhere ``(2 N, 11)``."""
+    count = len(columns) // 2
+    by_place = (columns[:, :count], columns[:, count : 2 * count])
+    return np.concatenate([*(x.sum(axis=1, keepdims=True) for x in by_place), columns[:, 2 * count :]], axis=1)
 
 
 def _squares(off: FloatArray, share: FloatArray, gravity: FloatArray) -> FloatArray:
