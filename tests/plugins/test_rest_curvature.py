@@ -7,6 +7,7 @@ import pytest
 
 from muslin.backends.mujoco import MujocoSimulator
 from muslin.core.arrays import FloatArray
+from muslin.core.bending import RopeBending, rope_rigidities
 from muslin.core.beside import Beside, closing_angles
 from muslin.core.body import Body, rope_line
 from muslin.core.effect import Effect
@@ -150,6 +151,16 @@ def test_it_is_offered_only_where_a_held_rope_was_seen_to_be_bent() -> None:
     assert why_powerless(RestCurvature, MujocoSimulator(), scenario) is None
     told = why_powerless(RestCurvature, MujocoSimulator(), replace(scenario, kept=None))
     assert told is not None and "start = 'measured'" in told
+
+
+@pytest.mark.parametrize("ratio", [1.0, 0.2])
+def test_the_part_that_no_state_tells_is_an_even_moment(ratio: float) -> None:
+    scenario = model(reality(0.0))
+    material = replace(MATERIAL, end_bending_ratio=ratio, far_bending_ratio=ratio)
+    body = RestCurvature(even_about_z=0.2).on_body(scenario, material, GRAVITY)
+    bending = RopeBending(body, np.concatenate(scenario.grasps))
+    moment = rope_rigidities(body, material) * np.linalg.norm(bending.rest, axis=1)
+    np.testing.assert_allclose(moment, 0.2 * material.bending_rigidity, rtol=1e-3)
 
 
 def test_strands_that_slide_go_with_it_in_any_order_and_it_is_told_by_what_they_leave() -> None:
