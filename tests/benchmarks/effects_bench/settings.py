@@ -192,7 +192,7 @@ SETTINGS: dict[str, Setting] = {
         },
         effects=(
             *("cylinder-drag", "wind", "viscous-damping", "internal-damping", "rope-hysteresis", "twist-stiffness"),
-            *("gravity-tilt", "wet-patch", "crease", *_HANDS, *_CAMERA),
+            *("uneven-rigidity", "gravity-tilt", "wet-patch", "crease", *_HANDS, *_CAMERA),
         ),
     ),
     "rope-table": Setting(
