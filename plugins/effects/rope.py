@@ -39,9 +39,9 @@ class UnevenRigidity(Effect):
     """A rope that bends more easily in some places than in others.
 
     Worn or kneaded where it is mostly held, wrapped, taped or marked in the middle, or made so. The coefficients are
-    natural logarithms of ratios, on top of those that the material has: that of its ends over its middle, and of its
-    last end over its first, each by half a period of a cosine and by one, of which the geometric mean along the rope
-    stays (:class:`~muslin.core.material.RopeMaterial`). Those are the slowest two terms of any course along a rope.
+    natural logarithms of ratios, on top of those that the material has: that of its ends over its middle, by one period
+    of a cosine, and of its last end over its first, by half a period. The geometric mean along the rope stays
+    (:class:`~muslin.core.material.RopeMaterial`). Those are the slowest two terms of any course along a rope.
 
     References:
         Antman, *Nonlinear Problems of Elasticity*, 1995: rods of which the properties vary along them.

@@ -173,9 +173,8 @@ def cloud(motion: str, sheet: str) -> Case:
 
 BEAMS = [beam("gravity-b"), beam("load52-a", ", from 52 g", HELD_LOWER)]
 CABLES = [cable(number) for number in (1, 2, 3)]
-SLIDES = ("rest-curvature", "rope-hysteresis")
-SLIDING = [given(case, "bent, sliding", *SLIDES) for case in CABLES]
-UNEVEN = [given(case, "bent, sliding, uneven", *SLIDES, "uneven-rigidity") for case in CABLES]
+SLIDING = [given(case, "bent, sliding", "rest-curvature", "rope-hysteresis") for case in CABLES]
+UNEVEN = [given(case, "uneven", "uneven-rigidity") for case in SLIDING]
 CARRIED = Case("carried cloth", DATA / "cloth_carried", carried_cloth)
 IN_AIR = Case("carried cloth, air", DATA / "cloth_carried", carried_in_air, picture=True)
 CASES = [
@@ -185,7 +184,7 @@ CASES = [
     *CABLES,
     *SLIDING,
     *UNEVEN,
-    *(on_pybullet(case, "twist_rigidity") for case in (*SLIDING, *UNEVEN)),
+    *(on_pybullet(case, "twist_rigidity") for case in SLIDING),
     *(CARRIED, on_pybullet(CARRIED), IN_AIR, on_pybullet(IN_AIR)),
     *(cloud(motion, sheet) for motion in ("lift", "fold") for sheet in ("tan", "paper", "navy")),
 ]

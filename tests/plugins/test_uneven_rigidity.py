@@ -8,12 +8,19 @@ from effect_objects import engine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from muslin.backends.mujoco.rod import looking_back
 from muslin.core.arrays import FloatArray
+from muslin.core.bending import rope_rigidities
+from muslin.core.body import rope_line
 from muslin.core.material import RopeMaterial
 from muslin.core.motion import Motion
 from muslin.core.rollout import rollout
 from muslin.core.scenario import Scenario
 from muslin.core.scenarios import preset
+from muslin.core.scene import Scene
+from muslin.core.simulator import State
+from muslin.plugins.effects.crease import Crease
+from muslin.plugins.effects.grip_load import BendingPull
 from muslin.plugins.effects.rope import UnevenRigidity
 from muslin.plugins.effects.strands import RopeHysteresis
 
@@ -68,6 +75,36 @@ def test_a_rope_that_is_stiffer_at_its_far_end_is_its_own_mirror_image(name: str
     moved = np.abs(one - path(MATERIAL, name=name)).max()
     assert moved > 4e-3
     assert np.abs(mirrored - other).max() < 0.02 * moved
+
+
+def test_what_effects_make_of_a_bend_is_of_the_rigidity_where_it_is() -> None:
+    """A rope that is bent at one vertex: a crease there, and what it pulls at a grasp, go with the rigidity there."""
+    line = rope_line(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]), 11)
+    uneven = replace(MATERIAL, end_bending_ratio=0.2, far_bending_ratio=3.0)
+    shares = rope_rigidities(line, uneven) / MATERIAL.bending_rigidity
+    for place in (1, 5, 9):
+        bent = line.vertices.copy()
+        bent[place + 1 :] = bent[place] + 0.05 * np.arange(1, 11 - place)[:, None] * [np.cos(0.8), np.sin(0.8), 0.0]
+
+        def made(material: RopeMaterial, bent: FloatArray = bent) -> tuple[FloatArray, FloatArray]:
+            scene = Scene(line, material, np.zeros(3), (), np.zeros(11))
+            crease = Crease(yield_radius=0.1).bind(scene, np.ones(11))
+            return crease(0.0, State(bent, 0.0 * bent)), BendingPull(scene)(bent)
+
+        for own, even in zip(made(uneven), made(MATERIAL), strict=True):
+            np.testing.assert_allclose(own, shares[place - 1] * even, atol=1e-9)
+        assert np.abs(made(MATERIAL)[0]).max() > 0.0
+
+
+def test_a_rope_looks_back_as_far_as_its_softest_place_allows() -> None:
+    angle = np.linspace(0.0, 4.0, 21)
+    body = rope_line(0.1 * np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=1), 21)
+    uneven = replace(MATERIAL, end_bending_ratio=0.1)
+    soft = replace(MATERIAL, bending_rigidity=float(rope_rigidities(body, uneven).min()))
+    held = np.array([0, 1])
+    found = [looking_back(body, rope, held, 0.005) for rope in (uneven, soft, MATERIAL)]
+    assert found[0] == pytest.approx(found[1])
+    assert found[0] < 0.9 * found[2]
 
 
 def test_what_strands_lose_as_they_slide_is_as_uneven() -> None:
