@@ -14,6 +14,7 @@ from ...core.interpolation import interpolate
 from ...core.measurement import Recording
 from ...core.motion import Motion, inverse, multiply, rotate
 from ...core.series import PointSeries
+from .carried_csv import exported, exported_takes, is_exported
 from .carried_turns import carried_turns
 from .grid_faults import lost_cloth
 from .metres import check_metres
@@ -35,7 +36,10 @@ RESTS = 0.005
 
 
 def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
-    """Takes from a folder of NPZ files, or one: ``mesh (T, n, n, 3)`` [m], ``t (T,)`` [s], and ``tcp``, ``tcp_t``.
+    """Takes of a session in a clone of the source, or from a folder of NPZ files, or one file of either.
+
+    In a clone, the folder of a session holds what ROS exported to CSV (:mod:`.carried_csv`). NPZ files have
+    ``mesh (T, n, n, 3)`` [m], ``t (T,)`` [s], and where the robot was recorded ``tcp (K, 7)`` and ``tcp_t (K,)``.
 
     Points are in the order of the vertices of a hanging cloth: row by row from the held top edge, which is the last
     index of axis 2 in the file, along x. The gripper is the middle of the top edge and turns with the hand: where it is
@@ -53,7 +57,7 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
         Luque, Parent, Colomé, Ocampo-Martinez and Torras, *Model predictive control for dynamic cloth manipulation:
         parameter learning and experimental validation* (2022); github.com/Alados5/tfm_matlab.
     """
-    files = archives(path, ("mesh", "t"))
+    files = exported_takes(path) or archives(path, ("mesh", "t"))
     made = []
     for name in chosen(takes, list(files), path):
         with about(files[name]):
@@ -62,7 +66,7 @@ def read_carried_cloth(path: Path, takes: Sequence[str]) -> list[Recording]:
 
 
 def _recording(path: Path, name: str) -> Recording:
-    data = arrays(path, ("mesh", "t"), ("tcp", "tcp_t"))
+    data = exported(path) if is_exported(path) else arrays(path, ("mesh", "t"), ("tcp", "tcp_t"))
     mesh = shaped(data["mesh"], (None, None, None, 3), "mesh", path)
     time = shaped(data["t"], (len(mesh),), "t", path)
     if mesh.shape[1] != mesh.shape[2] or mesh.shape[1] < 2:

@@ -17,13 +17,19 @@ from ...core.series import PointSeries
 from .carried_turns import carried_turns
 from .marker_faults import lost_frames, put_back, wrong_markers
 from .metres import check_metres
+from .pickled import pickled_numbers
 
 #: Along this axis of its gripper the cable leaves it.
 _ALONG = np.array([1.0, 0.0, 0.0])
+#: Of all cables of the source: the clamped markers, and frames a second.
+_CLAMPED, _FPS = np.array([0.0, 1.0, -2.0, -1.0]), 100.0
 
 
 def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
-    """Takes of one cable, from an NPZ file with ``markers (take, T, P, 3)`` [m], ``clamped (4,)``, ``fps``, ``names``.
+    """Takes of one cable, as they lie in a clone of the source or from one NPZ file.
+
+    In a clone, ``data_set/DLO1`` holds ``train`` and ``eval`` with a pickle a take: frames of ``(3, P)`` [m], z up.
+    The NPZ file has ``markers (take, T, P, 3)`` [m], ``clamped (4,)``, ``fps`` and ``names (take,)``.
 
     ``clamped`` are the outer and inner marker of the first end, then the inner and outer of the last. A gripper is
     where the outer one is, and turns as the pair turns, about no axis but that of the shortest rotation from frame to
@@ -36,8 +42,12 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
         Chen, Zhang, Brei, Vasudevan and others, *Differentiable discrete elastic rods for real-time modeling of
         deformable linear objects* (DEFORM), CoRL 2024; github.com/roahmlab/DEFORM.
     """
-    if not path.is_file():
-        raise MissingFileError(f"there is no file {path}; name the .npz file of one cable")
+    if not path.exists():
+        raise MissingFileError(
+            f"there is no file or folder {path}; name the folder of one cable (DLO1), or its .npz file"
+        )
+    if path.is_dir() or path.suffix == ".pkl":
+        return _of_clone(path, takes)
     data = arrays(path, ("markers", "clamped", "fps", "names"))
     markers = shaped(data["markers"], (None, None, None, 3), "markers", path)
     check_metres(markers, "markers", path)
@@ -50,6 +60,27 @@ def read_deform_cable(path: Path, takes: Sequence[str]) -> list[Recording]:
     for name in chosen(takes, names, path):
         with about(f"{path}, take {name!r}"):
             made.append(_recording(markers[names.index(name)], clamped, 1.0 / fps, name))
+    return made
+
+
+def _of_clone(path: Path, takes: Sequence[str]) -> list[Recording]:
+    """Takes of a cable's folder, of one of the two in it, or of one pickle."""
+    found = sorted((*path.glob("*.pkl"), *path.glob("*/*.pkl"))) if path.is_dir() else [path]
+    files = {file.stem: file for file in sorted(found, key=lambda f: (len(f.stem), f.stem))}
+    if not files:
+        raise InputError(f"{path} holds no .pkl file; name the folder of one cable, as data_set/DLO1 of the source")
+    if twice := next((file for file in found if files[file.stem] != file), None):
+        raise InputError(
+            f"{path} has two takes {twice.stem!r}: {twice} and {files[twice.stem]}; name one of the folders"
+        )
+    made = []
+    for name in chosen(takes, list(files), path):
+        with about(files[name]):
+            markers = shaped(pickled_numbers(files[name]), (None, 3, None), "its frames", files[name])
+            markers = markers.transpose(0, 2, 1)
+            check_metres(markers, "markers", files[name])
+            clamped = _clamped(_CLAMPED, markers.shape[1], files[name])
+            made.append(_recording(markers, clamped, 1.0 / _FPS, name))
     return made
 
 
