@@ -68,7 +68,9 @@ def _of_clone(path: Path, takes: Sequence[str]) -> list[Recording]:
     found = sorted((*path.glob("*.pkl"), *path.glob("*/*.pkl"))) if path.is_dir() else [path]
     files = {file.stem: file for file in sorted(found, key=lambda f: (len(f.stem), f.stem))}
     if not files:
-        raise InputError(f"{path} holds no .pkl file; name the folder of one cable, as data_set/DLO1 of the source")
+        raise InputError(
+            f"{path} holds no .pkl file; name the folder of one cable, as data_set/DLO1 of the source, or an .npz file"
+        )
     if twice := next((file for file in found if files[file.stem] != file), None):
         raise InputError(
             f"{path} has two takes {twice.stem!r}: {twice} and {files[twice.stem]}; name one of the folders"

@@ -17,7 +17,7 @@ class _Forbidden(Exception):
 class _Numbers(pickle.Unpickler):
     """Knows what NumPy arrays are made of, and nothing else."""
 
-    #: By the names of all versions of NumPy; what rebuilds an array says NumPy itself, and the last are old bytes.
+    #: By their names in all versions of NumPy; where they are in this one it says itself.
     KNOWN: ClassVar[dict[str, Any]] = {
         "ndarray": np.ndarray,
         "dtype": np.dtype,
