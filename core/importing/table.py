@@ -49,13 +49,14 @@ class Table:
         return value
 
 
-def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> Table:
+def read_table(path: Path, required: Sequence[str], optional: Sequence[str] | None) -> Table:
     """Read a comma-, semicolon- or tab-separated file whose first line names its columns.
 
     Args:
         path: of the file.
         required: columns that must be there.
-        optional: columns that may be there; any other is refused, so that a misspelt one is noticed.
+        optional: columns that may be there; any other is refused, so that a misspelt one is noticed. With None all may
+            be there, as in what a program has exported.
 
     Raises:
         InputError: not such a file; says which line or column.
@@ -85,7 +86,7 @@ def read_table(path: Path, required: Sequence[str], optional: Sequence[str]) -> 
     return Table(path, columns, rows)
 
 
-def _check_columns(path: Path, columns: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> None:
+def _check_columns(path: Path, columns: Sequence[str], required: Sequence[str], optional: Sequence[str] | None) -> None:
     layout = f"columns are {', '.join(required)}" + (f" and optionally {', '.join(optional)}" if optional else "")
     if not any(columns):
         raise InputError(f"{path} is empty; its first line must name the columns: {layout}")
@@ -96,6 +97,6 @@ def _check_columns(path: Path, columns: Sequence[str], required: Sequence[str], 
     if missing:
         found = ", ".join(columns)
         raise InputError(f"{path}: column {missing[0]!r} is missing; {layout}; found {found:.200}")
-    unknown = [c for c in columns if c not in (*required, *optional)]
+    unknown = [c for c in columns if optional is not None and c not in (*required, *optional)]
     if unknown:
         raise InputError(f"{path}: column {unknown[0]!r} is not known; {layout}")

@@ -1,6 +1,5 @@
 """A carried cloth as it lies in a clone of its source: what ROS recorded, exported to CSV."""
 
-import csv
 import re
 import warnings
 from pathlib import Path
@@ -9,8 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.arrays import FloatArray
 from ...core.errors import InputError
+from ...core.importing.gripper import QUATERNION_TOLERANCE
+from ...core.importing.table import Table, read_table
 from ...core.motion import rotate
 
 #: Of a file of the tracked grid, of the hand, and of the camera's pose.
@@ -19,6 +20,8 @@ _MESH, _TCP, _CAMERA = "_mesh", "_tcp", "_calibration_campose"
 _FOLDERS, _ENDINGS = ("Converted TXT", "Converted CSV"), (".txt", ".csv")
 _SESSION = re.compile(r"Session_(\d{4}_\d{2}_\d{2})")
 _STAMP = "field.header.stamp"
+#: Columns of poses: where, and the quaternion x y z w.
+_POSE = (*(f"position.{a}" for a in "xyz"), *(f"orientation.{a}" for a in "xyzw"))
 
 
 def exported_takes(path: Path) -> dict[str, Path]:
@@ -50,66 +53,39 @@ def exported(path: Path) -> dict[str, npt.NDArray[Any]]:
     Raises:
         InputError: a file is missing, or is not such a file.
     """
-    columns = _Columns(path)
-    stamps = columns.stamps()
-    size = int(columns.numbers(["field.size"])[0, 0])
-    if size < 2:
-        raise InputError(f"{path}: field.size must be 2 or more, the nodes along a side, but is {size}")
-    nodes = np.stack(
-        [columns.numbers([f"field.{axis}{k}" for k in range(size * size)]) for axis in "xyz"], axis=-1
-    ).reshape(len(stamps), size, size, 3)
-    position, turn = _camera(path, size)
+    table = read_table(path, (_STAMP, "field.size"), None)
+    stamps, nodes = _numbers(table, [_STAMP])[:, 0], _nodes(table)
+    position, turn = _camera(path, nodes.shape[1])
     out: dict[str, npt.NDArray[Any]] = {
         "mesh": rotate(turn, _upward(nodes)) + position,
         "t": (stamps - stamps[0]) / 1e9,
     }
     hand = path.with_stem(path.stem.removesuffix(_MESH) + _TCP)
     if hand.is_file():
-        poses = _Columns(hand)
-        out["tcp_t"] = (poses.stamps() - stamps[0]) / 1e9
-        out["tcp"] = poses.numbers(
-            [*(f"field.pose.position.{a}" for a in "xyz"), *(f"field.pose.orientation.{a}" for a in "xyzw")]
-        )
+        names = [f"field.pose.{part}" for part in _POSE]
+        poses = read_table(hand, (_STAMP, *names), None)
+        out["tcp_t"] = (_numbers(poses, [_STAMP])[:, 0] - stamps[0]) / 1e9
+        out["tcp"] = _numbers(poses, names)
     return out
 
 
-class _Columns:
-    """The columns of a CSV file that ROS exported.
+def _numbers(table: Table, names: list[str], *, gap: bool = False) -> FloatArray:
+    """Of some columns ``(T, N)``; with ``gap``, some may be missing."""
+    return np.array([[table.number(row, name, gap=gap) for name in names] for row in table.rows])
 
-    Raises:
-        InputError: it has no lines below its head, or a line is short.
-    """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        with path.open(newline="", encoding="utf-8", errors="replace") as file:
-            head, *self._rows = [row for row in csv.reader(file) if row] or [[]]
-        self._places = {name: k for k, name in enumerate(head)}
-        if not self._rows:
-            raise InputError(f"{path} has no lines below its head; export it again")
-        for number, row in enumerate(self._rows, start=2):
-            if len(row) != len(head):
-                raise InputError(f"{path}, line {number}: {len(row)} values for {len(head)} columns; export it again")
-
-    def numbers(self, names: list[str]) -> FloatArray:
-        """Of some columns ``(T, N)``."""
-        return np.array(self._read(float, names))
-
-    def stamps(self) -> IntArray:
-        """When each message was made ``(T,)`` [ns], as whole numbers: seconds since 1970 leave a float no room."""
-        return np.array(self._read(int, [_STAMP]), np.int64)[:, 0]
-
-    def _read(self, kind: type[float] | type[int], names: list[str]) -> list[list[float]]:
-        for name in names:
-            if name not in self._places:
-                raise InputError(f"{self._path} has no column {name!r}, so it is not of this set")
-        places, out = [self._places[name] for name in names], []
-        for number, row in enumerate(self._rows, start=2):
-            try:
-                out.append([kind(row[k]) for k in places])
-            except ValueError as error:
-                raise InputError(f"{self._path}, line {number}: {error}; export it again") from error
-        return out
+def _nodes(table: Table) -> FloatArray:
+    """The grid as it is told ``(T, n, n, 3)`` [m], NaN where a node was not seen."""
+    size = table.number(table.rows[0], "field.size")
+    count = sum(name.startswith("field.x") for name in table.columns)
+    axes = [[f"field.{axis}{k}" for k in range(count)] for axis in "xyz"]
+    if size < 2 or size * size != count or not {name for axis in axes for name in axis} <= set(table.columns):
+        raise InputError(
+            f"{table.path}: with field.size = {size:g} there must be columns field.x0 to field.x{size * size - 1:g}, "
+            f"and y and z alike, but it has {count} of x; export it again"
+        )
+    nodes = np.stack([_numbers(table, names, gap=True) for names in axes], axis=-1)
+    return nodes.reshape(len(nodes), int(size), int(size), 3)
 
 
 def _camera(path: Path, size: int) -> tuple[FloatArray, FloatArray]:
@@ -122,10 +98,12 @@ def _camera(path: Path, size: int) -> tuple[FloatArray, FloatArray]:
             f"{path} is told by a camera, but there is no {name}.csv beside it that says where that stood; copy the "
             "whole folder of the session"
         )
-    pose = _Columns(found).numbers(
-        [*(f"field.position.{a}" for a in "xyz"), *(f"field.orientation.{a}" for a in "wxyz")]
-    )[-1]
-    return pose[:3], pose[3:] / np.linalg.norm(pose[3:])
+    names = [f"field.{part}" for part in _POSE]
+    pose = _numbers(read_table(found, names, None), names)[-1]
+    length = float(np.linalg.norm(pose[3:]))
+    if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        raise InputError(f"{found}: the orientation of its last line has the length {length:.3g}, not 1")
+    return pose[:3], pose[[6, 3, 4, 5]] / length
 
 
 def _upward(nodes: FloatArray) -> FloatArray:
@@ -133,11 +111,8 @@ def _upward(nodes: FloatArray) -> FloatArray:
     with warnings.catch_warnings():  # a node that is never seen has no middle
         warnings.simplefilter("ignore", RuntimeWarning)
         middle = np.nanmedian(nodes, axis=0)
-    across, along = (abs(float(np.nanmean(np.diff(middle[..., 0], axis=axis)))) for axis in (0, 1))
-    if across < along:
-        nodes, middle = nodes.swapaxes(1, 2), middle.swapaxes(0, 1)
-    if np.nanmean(np.diff(middle[..., 0], axis=0)) < 0:
-        nodes = nodes[:, ::-1]
-    if np.nanmean(np.diff(middle[..., 1], axis=1)) > 0:
-        nodes = nodes[:, :, ::-1]
-    return nodes
+        across, along = (float(np.nanmean(np.diff(middle[..., 0], axis=axis))) for axis in (0, 1))
+        if abs(across) < abs(along):
+            nodes, middle, across = nodes.swapaxes(1, 2), middle.swapaxes(0, 1), along
+        down = float(np.nanmean(np.diff(middle[..., 1], axis=1)))
+    return nodes[:, :: -1 if across < 0 else 1, :: -1 if down > 0 else 1]

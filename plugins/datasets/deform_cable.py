@@ -17,7 +17,7 @@ from ...core.series import PointSeries
 from .carried_turns import carried_turns
 from .marker_faults import lost_frames, put_back, wrong_markers
 from .metres import check_metres
-from .pickled import pickled_numbers
+from .pickled import pickled_array
 
 #: Along this axis of its gripper the cable leaves it.
 _ALONG = np.array([1.0, 0.0, 0.0])
@@ -78,7 +78,7 @@ def _of_clone(path: Path, takes: Sequence[str]) -> list[Recording]:
     made = []
     for name in chosen(takes, list(files), path):
         with about(files[name]):
-            markers = shaped(pickled_numbers(files[name]), (None, 3, None), "its frames", files[name])
+            markers = shaped(pickled_array(files[name]), (None, 3, None), "its frames", files[name])
             markers = markers.transpose(0, 2, 1)
             check_metres(markers, "markers", files[name])
             clamped = _clamped(_CLAMPED, markers.shape[1], files[name])

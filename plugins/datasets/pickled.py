@@ -1,20 +1,20 @@
-"""Numbers out of pickles, which may run any code when they are read otherwise."""
+"""Arrays out of pickles, which may run any code when they are read otherwise."""
 
 import pickle
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import numpy.typing as npt
 
-from ...core.arrays import FloatArray
 from ...core.errors import InputError
 
 
 class _Forbidden(Exception):
-    """A pickle asks for more than numbers."""
+    """A pickle asks for more than arrays."""
 
 
-class _Numbers(pickle.Unpickler):
+class _Arrays(pickle.Unpickler):
     """Knows what NumPy arrays are made of, and nothing else."""
 
     #: By their names in all versions of NumPy; where they are in this one it says itself.
@@ -34,16 +34,16 @@ class _Numbers(pickle.Unpickler):
         raise _Forbidden(f"{module}.{name}")
 
 
-def pickled_numbers(path: Path) -> FloatArray:
-    """The array in a pickle, or that of a list of arrays of one shape; nothing in the file is run.
+def pickled_array(path: Path) -> npt.NDArray[Any]:
+    """The array in a pickle, or that of a list of arrays of one shape, of whatever type; nothing in the file is run.
 
     Raises:
         InputError: it holds something else, or is damaged.
     """
     try:
         with path.open("rb") as file:
-            held = _Numbers(file).load()
-        return np.asarray(held, np.float64)
+            held = _Arrays(file).load()
+        return np.asarray(held)
     except _Forbidden as error:
         raise InputError(
             f"{path} holds {error}, which is not read because it may run code; save it as NumPy arrays of numbers"
