@@ -83,10 +83,10 @@ def svg(figure: Figure, alt: str) -> str:
 
 
 def png(figure: Figure, dpi: int = 170) -> bytes:
-    """Raster picture."""
+    """Raster picture of all that is drawn: titles above axes of equal scales may reach beyond the figure."""
     FigureCanvasAgg(figure)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None}, bbox_inches="tight", pad_inches=0.05)
     return buffer.getvalue()
 
 

@@ -7,6 +7,7 @@ import sys
 from itertools import pairwise
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from made_up_study import ROLES, make_study
@@ -19,10 +20,22 @@ from muslin.cli.report.compared import distance
 from muslin.cli.report.figures_object import snapshots
 from muslin.cli.report.gather import gather
 from muslin.cli.report.predictive import predictive_data
+from muslin.cli.report.style import look, new_figure, png
 from muslin.cli.report.words import spread
 from muslin.core.errors import MissingFileError, MuslinError, StepMissingError, StoreError
 from muslin.core.store import storage_errors
 from muslin.core.study.study import Study
+
+
+def test_what_reaches_beyond_a_figure_is_in_its_picture() -> None:
+    """As a title of two lines does above axes of equal scales."""
+    with look():
+        figure = new_figure(3.0, 1.0)
+        figure.text(0.5, 1.1, "above", va="bottom")
+        picture = cv2.imdecode(np.frombuffer(png(figure, 100), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    ink = np.flatnonzero(picture.min(axis=1) < 128)
+    assert 0 < ink[0] < ink[-1] < len(picture) - 1
 
 
 def test_nothing_fitted_says_so(tmp_path: Path) -> None:
